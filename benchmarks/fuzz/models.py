@@ -444,14 +444,14 @@ class Messages:
 
     def __init__(self, folder: Path, outside: Path) -> None:
         from ptmtools.scene import messages
-        from ptmtools.scene.notes import Findings
-        from ptmtools.scene.source import Source, SourceMaterial
+        from ptmtools.scene.notes import IngestNotes
+        from ptmtools.scene.source import ModelSource, SourceMaterial
 
         self._names = furnished(folder, outside)
         self._model, self._scratch = folder / "a.usda", folder / "scratch"
         self._model.write_bytes(b"#usda 1.0")
         self._scratch.mkdir(exist_ok=True)
-        source = Source(
+        source = ModelSource(
             points=np.eye(3) * 10,
             triangles=np.array([[0, 1, 2], [2, 1, 0]]),
             uv=np.zeros((2, 3, 2)),
@@ -465,7 +465,7 @@ class Messages:
             kinds=("door", ""),
         )
         images = {0: messages.NamedImage("wall.png", "/a")}
-        findings = Findings(self._model)
+        findings = IngestNotes(self._model)
         findings.note("PTM-N215", "left out", "/b")
         self._answer = messages.pack_source(source, images, findings, str(self._scratch))
         self._arrays = (self._scratch / "source.npz").read_bytes()
@@ -484,11 +484,11 @@ class Messages:
 
     def read(self, case: Case) -> str:
         """Reads the message."""
-        from ptmtools.scene.notes import Findings
+        from ptmtools.scene.notes import IngestNotes
 
         (self._scratch / "source.npz").write_bytes(case.data)
         self._messages.run_in_sandbox = lambda *given, **options: case.facts
         source = self._messages.read_in_sandbox(
-            "", "the library", self._model, Findings(self._model), str(self._scratch)
+            "", "the library", self._model, IngestNotes(self._model), str(self._scratch)
         )
         return f"{len(source.triangles)} triangles"

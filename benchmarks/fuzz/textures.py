@@ -182,11 +182,11 @@ class Images:
 
     def _of_a_scene(self, data: bytes) -> str:
         from ptmtools.scene.images import ImageStore
-        from ptmtools.scene.notes import Findings
-        from ptmtools.scene.source import HeldBytes, Texture
+        from ptmtools.scene.notes import IngestNotes
+        from ptmtools.scene.source import HeldBytes, SourceTexture
 
-        store = ImageStore(Findings(self._file), LIMITS.decoded_bytes)
-        texture = Texture(HeldBytes(data), "a/../b.png", "map_Kd", "a.mtl:1")
+        store = ImageStore(IngestNotes(self._file), LIMITS.decoded_bytes)
+        texture = SourceTexture(HeldBytes(data), "a/../b.png", "map_Kd", "a.mtl:1")
         decoded = store.add(texture)
         store.record(texture, texture.channel)
         assert all("/" not in image.name for image in store.images)

@@ -60,7 +60,19 @@ _PLANNED = {"current": "unchanged", "run": "would run", "maybe": "may run"}
 
 def build_scene() -> click.Command:
     """The command that runs all stages, with the options of all."""
-    return click.command("build-scene", cls=Command)(_from_model(None))
+    return click.command("build-scene", cls=_BuildCommand)(_from_model(None))
+
+
+class _BuildCommand(Command):
+    """The command that runs all stages; its help lists the input formats."""
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from ptmtools.scene.formats import format_list
+
+        super().format_help_text(ctx, formatter)
+        formatter.write_paragraph()
+        with formatter.indentation():
+            formatter.write_text(f"Formats of models: {format_list()}.")
 
 
 def stage_command(stage: Stage[Any]) -> click.Command:
@@ -98,10 +110,8 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
     ) -> None:
         """Build a database from MODEL, or bring it up to date.
 
-        MODEL is an OBJ, glTF or GLB file, or a file in a format that trimesh, pymeshlab,
-        IfcOpenShell or usd-core reads. The database is a folder. Both may be URLs such as
-        s3://bucket/house.db. A second run repeats only the stages whose input or options have
-        changed.
+        MODEL is a file, and the database a folder. Both may be URLs such as s3://bucket/house.db. A
+        second run repeats only the stages whose input or options have changed.
         """
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,7 +19,8 @@ from ptmtools.cli.parameters import Command, json_option, local_copy, options_of
 from ptmtools.errors import InputError, naming
 from ptmtools.folder_kinds import folder_kind
 from ptmtools.quantities import count, size
-from ptmtools.scene.options import SUFFIXES, IngestOptions
+from ptmtools.scene.formats import find_format
+from ptmtools.scene.options import IngestOptions
 from ptmtools.store.copies import url_of
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
@@ -36,11 +37,7 @@ _SHOWN = 5
 
 def _copy(context: click.Context, parameter: click.Parameter, value: str) -> str:
     """As `local_copy`, but the URL of a model stays one."""
-    return (
-        value
-        if PurePath(value).suffix.lower() in SUFFIXES
-        else local_copy(context, parameter, value)
-    )
+    return value if find_format(value) else local_copy(context, parameter, value)
 
 
 @click.command("info", cls=Command)
@@ -63,7 +60,7 @@ def info(console: Console, target: str, **values: Any) -> None:
             console.result(record, [f"{Path(target)}: {kind.about}", *lines])
         else:
             _info_database(console, target)
-    elif Path(target).suffix.lower() in SUFFIXES:
+    elif find_format(target):
         _info_model(console, target, take(IngestOptions, values))
     else:
         _info_ptm(console, target)

@@ -24,8 +24,8 @@ from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import SourceMaterial, SourceWrap, Texture
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import SourceMaterial, SourceTexture, SourceWrap
 from ptmtools.scene.texels import uses_holes
 
 _BANDS = {"r": 0, "g": 1, "b": 2}
@@ -36,7 +36,7 @@ def bake(
     faces: Sequence[Ints],
     uv: Floats,
     store: ImageStore,
-    findings: Findings,
+    notes: IngestNotes,
     progress: Progress = silent,
     *,
     workers: int = 1,
@@ -51,12 +51,12 @@ def bake(
     ----------
     faces: for each material its rows of ``uv``, (T, 3, 2).
     """
-    baked = [_merge_mask(material, store, findings) for material in materials]
+    baked = [_merge_mask(material, store, notes) for material in materials]
     copied = False
     for number, rows in enumerate(faces):
         texture = baked[number].texture
         if texture is not None and "mirror" in (texture.wrap_s, texture.wrap_t):
-            texture, coords = _bake_mirror(texture, uv[rows], store, findings)
+            texture, coords = _bake_mirror(texture, uv[rows], store, notes)
             baked[number] = replace(baked[number], texture=texture)
             uv, copied = uv if copied else uv.copy(), True
             uv[rows] = coords
@@ -70,8 +70,9 @@ class MaskedBytes:
     """The bytes of a PNG in the size of an image, with its colours, or white without an image; its
     alpha is that of the image times the opacities of a mask.
 
-    ``channel`` of the mask as in `Texture`, ``limit`` as in `ImageStore`. Raises the errors of
-    reading, and InputError or LimitError for images that cannot be decoded or have no 8 or 16 bits.
+    ``channel`` of the mask as in `SourceTexture`, ``limit`` as in `ImageStore`. Raises the errors
+    of reading, and InputError or LimitError for images that cannot be decoded or have no 8 or 16
+    bits.
     """
 
     read: Callable[[], bytes] | None
@@ -125,7 +126,7 @@ def _resized(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.
     return opacity.astype(np.float64)
 
 
-def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings) -> SourceMaterial:
+def _merge_mask(material: SourceMaterial, store: ImageStore, notes: IngestNotes) -> SourceMaterial:
     mask, texture = material.mask, material.texture
     if mask is None:
         return material
@@ -146,7 +147,7 @@ def _merge_mask(material: SourceMaterial, store: ImageStore, findings: Findings)
             store.mark_as_input(part)
     if store.record(merged) is None:
         return replace(without, see_through=True)
-    findings.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
+    notes.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
     return replace(without, texture=merged)
 
 
@@ -178,8 +179,8 @@ class MirroredBytes:
 
 
 def _bake_mirror(
-    texture: Texture, uv: Floats, store: ImageStore, findings: Findings
-) -> tuple[Texture, Floats]:
+    texture: SourceTexture, uv: Floats, store: ImageStore, notes: IngestNotes
+) -> tuple[SourceTexture, Floats]:
     """The texture without mirrored repetition, and its (n, 3, 2) coordinates."""
     wraps: list[SourceWrap] = [texture.wrap_s, texture.wrap_t]
     doubled, coords = [False, False], uv.copy()
@@ -202,7 +203,7 @@ def _bake_mirror(
         if store.record(texture) is None or store.record(baked) is None:
             wrap_s, wrap_t = emitted_wraps(texture)
             return replace(texture, wrap_s=wrap_s, wrap_t=wrap_t), uv
-    findings.note("PTM-N215", f"{texture.what}: mirrored repetition baked in", texture.place)
+    notes.note("PTM-N215", f"{texture.what}: mirrored repetition baked in", texture.place)
     return baked, coords
 
 
@@ -217,7 +218,7 @@ def _folded(coordinate: Floats) -> Floats | None:
     return np.asarray(np.where(lowest[:, None] % 2 == 1, 1 - place, place))
 
 
-def emitted_wraps(texture: Texture | None) -> tuple[Wrap, Wrap]:
+def emitted_wraps(texture: SourceTexture | None) -> tuple[Wrap, Wrap]:
     """The wrap modes of a texture without mirrored repetition; "repeat" without a texture."""
     wrap_s, wrap_t = (texture.wrap_s, texture.wrap_t) if texture else ("repeat", "repeat")
     return "repeat" if wrap_s == "mirror" else wrap_s, "repeat" if wrap_t == "mirror" else wrap_t
@@ -242,7 +243,7 @@ def _drop_alpha(
 ) -> list[SourceMaterial]:
     """The materials with opaque images for those that ignore alpha and use transparent texels; a
     material that blends the same image keeps the original."""
-    ignoring: list[tuple[int, Texture, str]] = []
+    ignoring: list[tuple[int, SourceTexture, str]] = []
     visible: set[str] = set()
     for number, rows in enumerate(faces):
         texture = materials[number].texture

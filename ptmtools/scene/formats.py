@@ -1,180 +1,232 @@
-"""Reads formats other than OBJ and glTF: PLY, STL and OFF through trimesh, IFC through IfcOpenShell
-(`ifc`), USD through usd-core (`usd`), the rest through pymeshlab.
+"""The table of input formats.
 
-pymeshlab (GPL-3, needs libGL) does not expose which face has which texture, but writes it into OBJ
-files. So a child process (`sandbox`) converts the model to OBJ in a temporary folder, and `obj`
-reads the result: ``python -P -m ptmtools.scene.formats MEMORY MODEL FOLDER`` writes ``0.obj``, …
-and replies with their labels. The same path reads files that trimesh cannot read (mixed polygons in
-OFF), and textured PLY, of which trimesh keeps one image. Both libraries cut polygons as fans.
+A format is one declared `ModelFormat`: its suffixes, its reader, and what the format prescribes.
+Nothing else branches on a format or a suffix. Packages add formats through entry points of the
+group ``ptmtools.formats`` (`ptmtools.plugins`). Readers and their libraries are imported when a
+file of the format is read.
 """
 
 from __future__ import annotations
 
-import os
-import tempfile
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from ptmtools import plugins
+from ptmtools.errors import InputError, LimitError, MissingComponentError
+from ptmtools.lazy import Lazy
 
-from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.lazy import pymeshlab_absence
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.options import IFC, SUFFIXES, TRIMESH, USD
-from ptmtools.scene.sandbox import run_in_sandbox, serve
-from ptmtools.scene.source import MAX_VERTICES, Rows, Source, SourceMaterial, too_many_triangles
+if TYPE_CHECKING:
+    from ptmtools.progress import Progress
+    from ptmtools.scene.notes import IngestNotes
+    from ptmtools.scene.options import IngestOptions
+    from ptmtools.scene.source import ModelSource, SecondReading
+
+#: `Scene.triangles` is int32: more vertices cannot be numbered.
+MAX_VERTICES = 2**31 - 1
+#: The textures of a material beside its colours that a second reading may ask for.
+Purpose = Literal["lightmap", "reflection"]
 
 
-def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
-    """Writes the meshes of a model as OBJ files into ``scratch``; returns these with their labels.
+class ModelReader(Protocol):
+    """Reads a file into triangles in the units and axes of the file.
 
-    Raises InputError PTM-I254 if pymeshlab cannot read the model, MissingComponentError PTM-M100.
+    Raises InputError for a file that cannot be used; an OSError becomes PTM-I122 and a ValueError
+    PTM-I254, a damaged file. Names of other files are resolved by ``notes``, which also record what
+    is missing or dropped.
     """
-    if fault := pymeshlab_absence():
-        raise MissingComponentError(
-            "PTM-M100",
-            f"pymeshlab is unavailable ({fault})",
-            remedy="pip install pymeshlab; apt install libopengl0 libgl1; or convert to GLB",
-        )
-    labels = run_in_sandbox(__name__, "pymeshlab", path, path.absolute(), scratch)
-    return [(scratch / f"{i}.obj", label) for i, label in enumerate(labels)]
+
+    def __call__(
+        self, model: Path, notes: IngestNotes, options: IngestOptions, progress: Progress, /
+    ) -> ModelSource: ...
 
 
-def _convert(path: str, scratch: str) -> list[str]:
-    """Writes the meshes; returns their labels."""
-    import pymeshlab
+class SecondReader(Protocol):
+    """Reads a file again with other textures than the colours; None if it names none of these."""
 
-    meshes = pymeshlab.MeshSet()
-    labels: list[str] = []
-    meshes.load_new_mesh(path)
-    for mesh in meshes:
-        if not mesh.face_number():
-            continue
-        meshes.set_current_mesh(mesh.id())
-        meshes.apply_matrix_freeze()
-        meshes.save_current_mesh(
-            os.path.join(scratch, f"{len(labels)}.obj"),
-            save_vertex_normal=False,
-            save_vertex_color=False,
-            save_textures=False,
-        )
-        labels.append(mesh.label())
-    return labels
+    def __call__(
+        self, model: Path, options: IngestOptions, purpose: Purpose, /
+    ) -> SecondReading | None: ...
 
 
-if __name__ == "__main__":
-    serve(_convert)
+@dataclass(frozen=True)
+class FileFacts:
+    """The version of its format and the program that wrote it, both "" if a file does not state
+    them; and its extensions by name, with their support."""
+
+    version: str = ""
+    generator: str = ""
+    extensions: Mapping[str, str] = field(default_factory=dict)
 
 
-#: Bytes of a PLY file that contain its header.
-_HEADER = 1 << 14
+class FactsReader(Protocol):
+    """Reads what the head of a file states about it."""
+
+    def __call__(self, model: Path, /) -> FileFacts: ...
 
 
-def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
-    """Reads a file that is neither OBJ nor glTF, by its suffix.
+@dataclass(frozen=True)
+class ModelFormat:
+    """An input format.
 
-    Raises InputError for unknown suffixes and unreadable files, LimitError PTM-L203 for more than
-    ``max_triangles``, and MissingComponentError if a required library cannot be imported.
+    Attributes
+    ----------
+    name: the key in the table.
+    about: its usual name, for people.
+    suffixes: of its files, in lower case, with the dot.
+    reader: reads a file; through `read`, which checks what is common to all formats.
+    metres, up: the unit and the up axis that it prescribes for all files; None if each file records
+        its own (`ModelSource`), or none does.
+    usual_up: the up axis by convention, where neither the format nor the file defines one.
+    module, install: a library that the reader imports, and how to install it.
+    facts: reads the head of a file, for ``ptm info``.
+    second: reads the other textures of its materials.
     """
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
+
+    name: str
+    about: str
+    suffixes: tuple[str, ...]
+    reader: Lazy[ModelReader]
+    metres: float | None = None
+    up: Literal["y", "z"] | None = None
+    usual_up: Literal["y", "z"] | None = None
+    module: str = ""
+    install: str = ""
+    facts: Lazy[FactsReader] | None = None
+    second: Lazy[SecondReader] | None = None
+
+    def read(
+        self, model: Path, notes: IngestNotes, options: IngestOptions, progress: Progress
+    ) -> ModelSource:
+        """The triangles of a file.
+
+        Raises the errors of the reader; MissingComponentError PTM-M100 without its library; and
+        LimitError PTM-L203 for more triangles than ``options`` allow, or more vertices than int32
+        can number.
+        """
+        if self.module and find_spec(self.module) is None:
+            message = f"{self.about} requires the module {self.module}"
+            raise MissingComponentError("PTM-M100", message, file=model, remedy=self.install)
+        try:
+            source = self.reader.load()(model, notes, options, progress)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise InputError("PTM-I122", reason, file=error.filename or model) from None
+        except ValueError as error:
+            raise damage(model, str(error)) from None
+        if len(source.triangles) > options.max_triangles:
+            raise too_many_triangles(options.max_triangles, model)
+        if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
+            message = f"more than {MAX_VERTICES} vertices or faces"
+            raise LimitError("PTM-L203", message, file=model, remedy="split the model")
+        return source
+
+
+def damage(model: Path, reason: str) -> InputError:
+    """The error for a file that is damaged, PTM-I254."""
+    return InputError("PTM-I254", f"damaged ({reason})", file=model, remedy="export it again")
+
+
+def too_many_triangles(limit: int, file: Path) -> LimitError:
+    """The error for a model of more triangles than the limit, PTM-L203."""
+    return LimitError(
+        "PTM-L203",
+        f"has more than {limit:,} triangles",
+        file=file,
+        remedy="raise the limit (--max-triangles), or split the model",
+    )
+
+
+OBJ = ModelFormat(
+    "obj", "Wavefront OBJ", (".obj",), Lazy("ptmtools.scene.obj:read_obj"), usual_up="y"
+)
+GLTF = ModelFormat(
+    name="gltf",
+    about="glTF",
+    suffixes=(".gltf",),
+    reader=Lazy("ptmtools.scene.gltf.reader:read_gltf"),
+    metres=1.0,
+    up="y",
+    facts=Lazy("ptmtools.scene.gltf.document:facts_of"),
+    second=Lazy("ptmtools.scene.gltf.reader:read_again"),
+)
+GLB = replace(GLTF, name="glb", about="glTF binary", suffixes=(".glb",))
+IFC = ModelFormat(
+    name="ifc",
+    about="IFC",
+    suffixes=(".ifc",),
+    reader=Lazy("ptmtools.scene.ifc.reader:read_ifc"),
+    up="z",
+    module="ifcopenshell",
+    install="pip install 'ptmtools[ifc]'",
+)
+IFCZIP = replace(
+    IFC, name="ifczip", suffixes=(".ifczip",), reader=Lazy("ptmtools.scene.ifc.reader:read_ifczip")
+)
+USD = ModelFormat(
+    name="usd",
+    about="USD",
+    suffixes=(".usd", ".usda", ".usdc"),
+    reader=Lazy("ptmtools.scene.usd.reader:read_usd"),
+    module="pxr",
+    install="pip install 'ptmtools[usd]'",
+)
+USDZ = replace(USD, name="usdz", about="USDZ", suffixes=(".usdz",))
+
+
+def _of_library(name: str, about: str = "", reader: str = "read_by_pymeshlab") -> ModelFormat:
+    reading = Lazy[ModelReader](f"ptmtools.scene.libraries:{reader}")
+    return ModelFormat(name, about or name.upper(), (f".{name}",), reading)
+
+
+#: The formats of this package by name.
+FORMATS = {
+    row.name: row
+    for row in (
+        *(OBJ, GLB, GLTF),
+        _of_library("ply", reader="read_ply"),
+        _of_library("stl", reader="read_stl"),
+        _of_library("off", reader="read_off"),
+        _of_library("3ds", "3D Studio"),
+        _of_library("3mf"),
+        _of_library("ctm", "OpenCTM"),
+        _of_library("dae", "COLLADA"),
+        _of_library("wrl", "VRML"),
+        _of_library("x3d"),
+        *(IFC, IFCZIP, USD, USDZ),
+    )
+}
+
+
+def formats() -> Iterator[ModelFormat]:
+    """All formats, those of this package first; raises as `plugins.declared`."""
+    yield from FORMATS.values()
+    yield from plugins.declared("formats", ModelFormat).values()
+
+
+def find_format(name: str | PurePath) -> ModelFormat | None:
+    """The format of a file by its suffix, the first that has it; None if none has."""
+    suffix = PurePath(name).suffix.lower()
+    return next((row for row in formats() if suffix in row.suffixes), None)
+
+
+def format_of(model: PurePath) -> ModelFormat:
+    """The format of a model file. Raises InputError PTM-I243 if no format has its suffix."""
+    if (row := find_format(model)) is None:
         raise InputError(
             "PTM-I243",
-            f"unsupported format {suffix or '(no suffix)'}",
-            file=path,
-            remedy=f"use one of {' '.join(SUFFIXES)}",
+            f"unsupported format {model.suffix.lower() or '(no suffix)'}",
+            file=model,
+            remedy=f"use one of {' '.join(suffix for row in formats() for suffix in row.suffixes)}",
         )
-    if suffix in IFC:
-        from ptmtools.scene.ifc.reader import read_ifc
-
-        return read_ifc(path, findings, max_triangles)
-    if suffix in USD:
-        from ptmtools.scene.usd.reader import read_usd
-
-        return read_usd(path, findings, max_triangles)
-    if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path, findings)):
-        return _read_meshlab(path, findings, max_triangles)
-    try:
-        source = _read_trimesh(path, findings)
-    except InputError:
-        raise
-    except Exception as error:  # trimesh raises any exception for a damaged file
-        if suffix == ".stl":  # pymeshlab supports no variants that trimesh lacks
-            raise InputError(
-                "PTM-I254", f"damaged ({error})", file=path, remedy="export it again"
-            ) from None
-        source = _read_meshlab(path, findings, max_triangles)
-        findings.note(
-            "PTM-N208", f"read by pymeshlab because trimesh failed ({type(error).__name__})"
-        )
-    if len(source.triangles) > max_triangles:
-        raise too_many_triangles(max_triangles, path)
-    return source
+    return row
 
 
-def _textured_ply(path: Path, findings: Findings) -> bool:
-    with open(path, "rb") as stream:
-        head = stream.read(_HEADER).split(b"end_header")[0].lower()
-    textured = b"texturefile" in head
-    if textured and b" red" in head:
-        findings.note("PTM-N215", "colours of vertices dropped in favour of textures")
-    return textured
-
-
-def _read_trimesh(path: Path, findings: Findings) -> Source:
-    import trimesh
-
-    with open(path, "rb") as stream:
-        scene = trimesh.load_scene(stream, file_type=path.suffix.lower()[1:], process=False)
-    rows = Rows()
-    for name in scene.graph.nodes_geometry:
-        matrix, geometry = scene.graph.get(name)
-        mesh = scene.geometry[geometry]
-        faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3))), dtype=np.int64)
-        points = np.asarray(mesh.vertices, dtype=np.float64)
-        if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
-            raise InputError("PTM-I245", "a face refers to a missing vertex", file=path)
-        colors, uv = _colors(mesh, faces, findings), np.zeros((len(faces), 3, 2))
-        rows.add(np.asarray(matrix)[None], points, faces, uv, 0, colors, len(rows.names))
-        rows.names.append(path.stem if len(scene.geometry) == 1 else str(geometry))
-    if not any(map(len, rows.triangles)):
-        raise _no_faces(path)
-    return rows.source(materials=(SourceMaterial("default"),))
-
-
-def _no_faces(path: Path) -> InputError:
-    return InputError("PTM-I247", "no faces", file=path, remedy="use a model with faces")
-
-
-def _colors(mesh: Any, faces: NDArray[np.int64], findings: Findings) -> NDArray[np.uint8] | None:
-    """(T, 3, 3) sRGB of corners, if vertices or faces have colours."""
-    kind = getattr(mesh.visual, "kind", None)
-    if kind not in ("vertex", "face"):
-        return None
-    colors = mesh.visual.vertex_colors if kind == "vertex" else mesh.visual.face_colors
-    rows = np.asarray(colors, dtype=np.uint8)
-    if (rows[:, 3:] < 255).any():
-        findings.note("PTM-N215", "opacities of vertices and faces dropped")
-    return rows[faces, :3] if kind == "vertex" else np.repeat(rows[:, None, :3], 3, axis=1)
-
-
-def _read_meshlab(path: Path, findings: Findings, max_triangles: int) -> Source:
-    from ptmtools.scene.obj import read_obj
-
-    parts = []
-    with tempfile.TemporaryDirectory() as scratch:
-        findings.folder.admit(Path(scratch))
-        for converted, label in convert(path, Path(scratch)):
-            part = read_obj(converted, findings, max_triangles=max_triangles)
-            parts.append((label or path.stem, part))
-    if not parts:
-        raise _no_faces(path)
-    rows = Rows()
-    materials: list[SourceMaterial] = []
-    for name, part in parts:
-        first, numbers = len(rows.names), part.triangle_material + len(materials)
-        rows.add(np.eye(4)[None], part.points, part.triangles, part.uv, numbers, part.colors, first)
-        rows.names.append(name)
-        materials += part.materials
-    return rows.source(materials=tuple(materials))
+def format_list() -> str:
+    """The formats with their suffixes, for help texts."""
+    suffixes: dict[str, list[str]] = {}
+    for row in formats():
+        suffixes.setdefault(row.about, []).extend(row.suffixes)
+    return ", ".join(f"{about} ({' '.join(ends)})" for about, ends in suffixes.items())

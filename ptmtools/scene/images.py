@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import FileRange, Texture
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import FileRange, SourceTexture
 from ptmtools.texture.images.picture import check_bytes, check_size
 from ptmtools.texture.model import Description, Limits
 
@@ -103,8 +103,8 @@ class ImageStore:
     ``limit`` is the largest size of the decoded texels of an image, in bytes, at four per texel.
     """
 
-    def __init__(self, findings: Findings, limit: int) -> None:
-        self._findings = findings
+    def __init__(self, notes: IngestNotes, limit: int) -> None:
+        self._notes = notes
         self.limit = limit
         self._examined: dict[tuple[Callable[[], bytes], str | None], ImageRecord] = {}
         self._index: dict[str, int] = {}
@@ -124,12 +124,12 @@ class ImageStore:
             for image, files in zip(self._images, self._files, strict=True)
         )
 
-    def examine(self, textures: Iterable[Texture], workers: int, progress: Progress) -> None:
+    def examine(self, textures: Iterable[SourceTexture], workers: int, progress: Progress) -> None:
         """Decodes the images of these textures with ``workers`` threads, before they are added.
 
         Raises LimitError PTM-L104, as the other methods do.
         """
-        pending: dict[Callable[[], bytes], Texture] = {}
+        pending: dict[Callable[[], bytes], SourceTexture] = {}
         for texture in textures:
             if (texture.read, None) not in self._examined:
                 pending.setdefault(texture.read, texture)
@@ -140,7 +140,7 @@ class ImageStore:
                 self._examined[read, None] = record
         progress(len(pending), len(pending), "images")
 
-    def add(self, texture: Texture) -> tuple[int, NDArray[np.bool_] | None] | None:
+    def add(self, texture: SourceTexture) -> tuple[int, NDArray[np.bool_] | None] | None:
         """The number of a texture's image, and its `ImageRecord.holes`; None, and a miss, if it
         cannot be decoded."""
         record = self.record(texture)
@@ -156,28 +156,28 @@ class ImageStore:
             self._files[index].add(file)
         return index, record.holes
 
-    def _whole_file(self, texture: Texture) -> str | None:
+    def _whole_file(self, texture: SourceTexture) -> str | None:
         """The file that consists of a texture's image, relative to the model's folder."""
-        read, folder = texture.read, self._findings.folder
+        read, folder = texture.read, self._notes.folder
         if not isinstance(read, FileRange) or read.offset or read.length is not None:
             return None
         name = Path(os.path.relpath(read.path, folder.root)).as_posix()
         return name if name in folder.sought else None
 
-    def mark_as_input(self, texture: Texture) -> None:
+    def mark_as_input(self, texture: SourceTexture) -> None:
         """Records that another image is derived from this one, which is then not `plain`."""
         if file := self._whole_file(texture):
             self._inputs.add(file)
 
-    def record(self, texture: Texture, channel: str | None = None) -> ImageRecord | None:
-        """The properties of an image, or with a ``channel`` (`Texture`) those of a mask; None, and
-        a miss, if it cannot be decoded."""
+    def record(self, texture: SourceTexture, channel: str | None = None) -> ImageRecord | None:
+        """The properties of an image, or with a ``channel`` (`SourceTexture`) those of a mask;
+        None, and a miss, if it cannot be decoded."""
         key = texture.read, channel
         if key not in self._examined:
             with warnings.catch_warnings(action="ignore"):
                 self._examined[key] = _examine(texture, self.limit, channel)
         if fault := self._examined[key].fault:
-            self._findings.miss("PTM-N206", f"{texture.what}: {fault}", texture.place)
+            self._notes.miss("PTM-N206", f"{texture.what}: {fault}", texture.place)
             return None
         return self._examined[key]
 
@@ -198,7 +198,7 @@ class ImageStore:
         return f"{unique}.{_suffix(kind)}"
 
 
-def _examine(texture: Texture, limit: int, channel: str | None = None) -> ImageRecord:
+def _examine(texture: SourceTexture, limit: int, channel: str | None = None) -> ImageRecord:
     """Reads and decodes an image; ``channel`` as in `_holes`.
 
     Raises LimitError PTM-L104.
@@ -226,7 +226,7 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> ImageR
     )
 
 
-def read_within(texture: Texture, limit: int) -> bytes:
+def read_within(texture: SourceTexture, limit: int) -> bytes:
     """The bytes of an image. Raises LimitError PTM-L104, and the errors of reading."""
     if size := getattr(texture.read, "size", None):
         check_bytes(size(), Limits(limit))
@@ -287,7 +287,7 @@ def _suffix(kind: str) -> str:
 def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
     """The texels that are not opaque, as bits packed along rows; None if all are opaque.
 
-    ``channel`` is that of a mask (`Texture`), None for the alpha of an image.
+    ``channel`` is that of a mask (`SourceTexture`), None for the alpha of an image.
     """
     mode, band = ("RGB", _MASK_BANDS[channel]) if channel in _MASK_BANDS else ("L", "L")
     if opened.has_transparency_data and channel in (None, "", "m"):

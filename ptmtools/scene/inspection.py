@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import io
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.gltf.document import document_json, support_of
+from ptmtools.scene.formats import FileFacts, format_of
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation.up_axis import (
-    USUAL_UP,
     Candidate,
     NamedFaces,
     Up,
@@ -24,20 +24,6 @@ from ptmtools.scene.orientation.up_axis import (
 )
 from ptmtools.texture.images.opening import opened
 from ptmtools.texture.model import Limits
-
-#: Formats that are not called like their suffix.
-_FORMATS = {
-    ".3ds": "3D Studio",
-    ".ctm": "OpenCTM",
-    ".dae": "COLLADA",
-    ".glb": "glTF binary",
-    ".gltf": "glTF",
-    ".ifczip": "IFC",
-    ".obj": "Wavefront OBJ",
-    ".usda": "USD",
-    ".usdc": "USD",
-    ".wrl": "VRML",
-}
 
 
 @dataclass(frozen=True)
@@ -71,7 +57,7 @@ class Inspection:
     Attributes
     ----------
     format, generator: of the file, and the program that wrote it, "" if unknown.
-    extensions: of glTF, by name, with their support.
+    extensions: by name, with their support.
     objects: triangles by name, summed over objects of the same name, the largest first.
     images: that faces use, in the order of the file.
     best: the most likely candidate for unit and up axis.
@@ -83,7 +69,7 @@ class Inspection:
     format: str
     generator: str
     bytes: int
-    extensions: dict[str, str]
+    extensions: Mapping[str, str]
     objects: dict[str, int]
     images: tuple[ImageFacts, ...]
     best: Guess
@@ -100,19 +86,17 @@ def inspect(
 ) -> Inspection:
     """Reads a model and describes it. Raises the errors of `ingest`."""
     scene = ingest(path, options, progress, workers=workers, ask=False)
-    suffix = path.suffix.lower()
-    tree = document_json(path) if suffix in (".glb", ".gltf") else {}
-    asset = tree.get("asset", {})
-    extensions = tree.get("extensionsUsed", []) + tree.get("extensionsRequired", [])
+    row = format_of(path)
+    facts = row.facts.load()(path) if row.facts else FileFacts()
     triangles = Counter[str]()
     for index, count in enumerate(np.bincount(scene.triangle_object).tolist()):
         triangles[scene.objects[index]] += count
-    best, *others = _guesses(scene, USUAL_UP.get(suffix))
+    best, *others = _guesses(scene, row.usual_up)
     return Inspection(
-        format=f"{_FORMATS.get(suffix, suffix[1:].upper())} {asset.get('version', '')}".strip(),
-        generator=str(asset.get("generator", "")),
+        format=f"{row.about} {facts.version}".strip(),
+        generator=facts.generator,
         bytes=path.stat().st_size,
-        extensions={name: support_of(name) for name in sorted({*map(str, extensions)})},
+        extensions=facts.extensions,
         objects=dict(triangles.most_common()),
         images=tuple(_facts(image, options) for image in scene.images),
         best=best,

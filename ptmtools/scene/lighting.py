@@ -21,10 +21,9 @@ from ptmtools.scene.faces import KeptFaces
 from ptmtools.scene.images import ImageStore, integers, read_within
 from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap
 from ptmtools.scene.model import Space
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.options import GLTF, IngestOptions
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.orientation.space import rotated, to_world
-from ptmtools.scene.source import Source, SourceMaterial, Texture
+from ptmtools.scene.source import ModelSource, SecondReading, SourceMaterial, SourceTexture
 from ptmtools.texture.model import Limits
 
 #: Coordinates may be this far outside of an image that lies on its surfaces once.
@@ -38,36 +37,29 @@ T = TypeVar("T")
 
 
 def lights_of(
-    source: Source,
-    kept: KeptFaces,
+    source: ModelSource,
     used: Ints,
     space: Space,
-    store: ImageStore,
-    findings: Findings,
-    options: IngestOptions,
+    images: LightImages,
 ) -> Lights:
-    """The lights of the kept faces of a model. ``used``: (M,) the materials of the scene by their
-    numbers in the source."""
-    reader = _Reader(store, findings)
+    """The lights of a model without its lightmaps. ``used``: (M,) the materials of the scene by
+    their numbers in the source."""
     materials = [source.materials[number] for number in used.tolist()]
-    plain = Lights(
-        np.array([reader.glow(material) for material in materials], np.float32),
+    return Lights(
+        np.array([images.glow(material) for material in materials], np.float32),
         np.array([material.unlit for material in materials], np.bool_),
         tuple(_placed(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
         np.zeros((0, 3, 2), np.float32),
         (),
     )
-    if findings.model.suffix.lower() not in GLTF:
-        return plain
-    return _with_maps(plain, kept, used, reader, options)
 
 
-class _Reader:
+class LightImages:
     """The images of lights, each read and decoded once."""
 
-    def __init__(self, store: ImageStore, findings: Findings) -> None:
-        self._store, self.findings = store, findings
+    def __init__(self, store: ImageStore, notes: IngestNotes) -> None:
+        self._store, self.notes = store, notes
         self._means = dict[Callable[[], bytes], float | None]()
         self._maps = dict[Callable[[], bytes], bytes | None]()
         self._held = dict[bytes, bytes]()
@@ -77,13 +69,13 @@ class _Reader:
         glow = min(max(0.0, material.glow), MOST)
         if glow != material.glow:
             text = f"{material.name}: emission of {material.glow:g} changed to {glow:g}"
-            self.findings.note("PTM-N215", text)
+            self.notes.note("PTM-N215", text)
         if not glow or material.glow_map is None:
             return glow
         mean = self._read(material.glow_map, self._means, _mean)
         return glow if mean is None else glow * mean
 
-    def lightmap(self, texture: Texture) -> bytes | None:
+    def lightmap(self, texture: SourceTexture) -> bytes | None:
         """The bytes of a lightmap that can be decoded; equal ones are the same object. None, and a
         note, for others."""
         from ptmtools.texture.images.files import load_image
@@ -96,7 +88,7 @@ class _Reader:
 
     def _read(
         self,
-        texture: Texture,
+        texture: SourceTexture,
         results: dict[Callable[[], bytes], T | None],
         use: Callable[[bytes, int], T],
     ) -> T | None:
@@ -111,7 +103,7 @@ class _Reader:
                     results[texture.read] = use(data, self._store.limit)
             except (PtmError, OSError) as fault:
                 message = fault.message if isinstance(fault, PtmError) else str(fault)
-                self.findings.note("PTM-N206", f"{texture.what}: {message}", texture.place)
+                self.notes.note("PTM-N206", f"{texture.what}: {message}", texture.place)
         return results[texture.read]
 
 
@@ -136,36 +128,32 @@ def _placed(lamp: Lamp, space: Space) -> Lamp:
     return replace(lamp, position=(x, y, z), direction=(dx, dy, dz))
 
 
-def _with_maps(
-    plain: Lights, kept: KeptFaces, used: Ints, reader: _Reader, options: IngestOptions
+def add_maps(
+    plain: Lights, read: SecondReading, kept: KeptFaces, used: Ints, images: LightImages
 ) -> Lights:
-    """The lights of a glTF with its lightmaps."""
-    from ptmtools.scene.gltf.second import read_again
-
-    findings = reader.findings
-    read = read_again(findings.model, options, lambda entry: entry.get("occlusionTexture"))
-    if read is None:
-        return plain
+    """The lights of the kept faces with the lightmaps of the model, as a second reading has them;
+    ``used`` as in `lights_of`."""
+    notes = images.notes
     for note in read.missing:
-        findings.note(note.code, note.message, note.place)
-    findings.folder.sought.update(dict.fromkeys(read.sought))
+        notes.note(note.code, note.message, note.place)
+    notes.folder.sought.update(dict.fromkeys(read.sought))
     uv = read.source.uv[kept.source]
     material = read.source.triangle_material[kept.source]
     index = np.full(len(used), -1, np.int32)
     maps: dict[ModelMap, int] = {}
-    for number, own in enumerate(used.tolist()):
-        texture, place = read.source.materials[own].texture, uv[material == own]
+    for number, original in enumerate(used.tolist()):
+        texture, place = read.source.materials[original].texture, uv[material == original]
         if texture is None:
             continue
         if not (np.isfinite(place).all() and plane_areas(place).any()):
             text = f"{texture.what}: lightmap of surfaces without coordinates in it left out"
-            findings.note("PTM-N215", text, texture.place)
+            notes.note("PTM-N215", text, texture.place)
             continue
         outside = (place < -_OUTSIDE) | (place > 1 + _OUTSIDE)
         ways = texture.wrap_s, texture.wrap_t
         if (outside.any(axis=(0, 1)) & [way != "clamp" for way in ways]).any():
             continue
-        if (data := reader.lightmap(texture)) is not None:
+        if (data := images.lightmap(texture)) is not None:
             index[number] = maps.setdefault(ModelMap(data, ways, texture.strength), len(maps))
     if not maps:
         return plain

@@ -24,9 +24,9 @@ from ptmtools.scene.model import (
     room_arrays,
     rooms_of,
 )
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.sandbox import run_in_sandbox, unreadable
-from ptmtools.scene.source import FileRange, Source, SourceMaterial, SourceWrap, Texture
+from ptmtools.scene.source import FileRange, ModelSource, SourceMaterial, SourceTexture, SourceWrap
 from ptmtools.store.archive import Stored, pack_arrays, unpack_arrays
 
 _ARRAYS = "source.npz"
@@ -56,9 +56,9 @@ class NamedImage:
 
 
 def pack_source(
-    source: Source,
+    source: ModelSource,
     images: dict[int, NamedImage],
-    findings: Findings,
+    notes: IngestNotes,
     scratch: str,
     files: Iterable[str] = (),
 ) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def pack_source(
         "rooms": [room.name for room in source.rooms],
         "metres": source.metres,
         "up": source.up,
-        "findings": findings.records(),
+        "findings": notes.records(),
         "files": list(files),
     }
 
@@ -94,11 +94,11 @@ def read_in_sandbox(
     module: str,
     library: str,
     model: Path,
-    findings: Findings,
+    notes: IngestNotes,
     scratch: str,
     *arguments: str,
     other_bytes: int = 0,
-) -> Source:
+) -> ModelSource:
     """The source that the reader of a module packs; its arguments are the folder ``scratch``, the
     model and ``arguments``. ``other_bytes`` as in `run_in_sandbox`.
 
@@ -116,15 +116,15 @@ def read_in_sandbox(
         points = stored.array("points", np.float64, None, 3)
         triangles = stored.indices("triangles", np.int64, None, 3, high=len(points))
         n = len(triangles)
-        findings.add_records(message["findings"])
+        notes.add_records(message["findings"])
         for name in message["files"]:
-            findings.folder.find(name)
+            notes.folder.find(name)
         materials = [SourceMaterial(**fields_of(row)) for row in message["materials"]]
         for number, row in message["images"].items():
-            texture = _texture(NamedImage(**row), model, findings)
+            texture = _texture(NamedImage(**row), model, notes)
             materials[int(number)] = replace(materials[int(number)], texture=texture)
         objects = tuple(message["objects"])
-        return Source(
+        return ModelSource(
             points=points,
             triangles=triangles,
             uv=stored.array("uv", np.float64, n, 3, 2),
@@ -144,13 +144,13 @@ def read_in_sandbox(
         raise unreadable(library, model, str(error)) from None
 
 
-def _texture(image: NamedImage, model: Path, findings: Findings) -> Texture | None:
+def _texture(image: NamedImage, model: Path, notes: IngestNotes) -> SourceTexture | None:
     name = image.package or image.name
     embedded = image.offset is not None and not image.package
-    file = model if embedded else findings.locate(name, name, image.place)
+    file = model if embedded else notes.locate(name, name, image.place)
     if file is None:
         return None
-    return Texture(
+    return SourceTexture(
         read=FileRange(file, image.offset or 0, image.length),
         label=file.name if image.offset is None else image.name,
         what=image.name,

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import decode
 
 #: Size limit of a library, MiB; those of whole cities have a few.
@@ -129,7 +129,7 @@ class MtlMaterial:
     map_ke: MapStatement | None = None
 
 
-def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
+def read_mtl(path: Path, notes: IngestNotes) -> dict[str, MtlMaterial]:
     """The materials by name, in the order of the file, the first of each name.
 
     An invalid line is a miss. Raises LimitError PTM-L204 for a library larger than `LARGEST`, and
@@ -144,7 +144,7 @@ def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
                 remedy="remove the unused materials",
             )
         data = stream.read()
-    label = findings.folder.label(path)
+    label = notes.folder.label(path)
     materials: dict[str, MtlMaterial] = {}
     current: MtlMaterial | None = None
     for index, line in enumerate(re.split(r"\r\n|\n|\r", decode(data)), start=1):
@@ -156,7 +156,7 @@ def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
         if key == "newmtl":
             current = MtlMaterial(path)
             if materials.setdefault(rest, current) is not current:
-                findings.note(
+                notes.note(
                     "PTM-N208", f"material {rest} defined again; the first definition used", place
                 )
         elif current is not None:
@@ -164,7 +164,7 @@ def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
                 _statement(current, key, rest, index)
             except ValueError as error:
                 message = f"invalid statement {line.strip()[:80]} ({error})"
-                findings.miss("PTM-N214", message, place)
+                notes.miss("PTM-N214", message, place)
     return materials
 
 

@@ -19,8 +19,8 @@ from ptmtools.errors import LimitError, PtmError
 from ptmtools.scene.baking import OpaqueBytes, emitted_wraps
 from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import NormalImage
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import NormalTexture, Texture
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import NormalTexture, SourceTexture
 
 #: Largest difference of the components of a grey image, of 255.
 _GREY = 2
@@ -80,12 +80,12 @@ def _strips(image: NDArray[Any]) -> Iterator[slice]:
 class NormalMaps:
     """Adds the normal maps of materials to the images of a scene."""
 
-    def __init__(self, store: ImageStore, findings: Findings) -> None:
-        self._store, self._findings = store, findings
+    def __init__(self, store: ImageStore, notes: IngestNotes) -> None:
+        self._store, self._notes = store, notes
         self._kinds = dict[Callable[[], bytes], str]()
 
     def add(
-        self, normal: NormalTexture, texture: Texture | None, *, moved: bool
+        self, normal: NormalTexture, texture: SourceTexture | None, *, moved: bool
     ) -> NormalImage | None:
         """The normal map of a material with an image ``texture``, whose coordinates are ``moved``
         if mirrored repetition was baked into them; None, and a note, if it cannot be used.
@@ -107,7 +107,9 @@ class NormalMaps:
             return None
         return NormalImage(added[0], scale, *wraps, own)
 
-    def _normals(self, use: Texture, scale: float, *, height: bool) -> tuple[Texture | None, float]:
+    def _normals(
+        self, use: SourceTexture, scale: float, *, height: bool
+    ) -> tuple[SourceTexture | None, float]:
         """The image of normals, and the scale of these."""
         if height:  # whose kind depends on its texels
             self._store.mark_as_input(use)
@@ -129,7 +131,7 @@ class NormalMaps:
             return replace(use, read=OpaqueBytes(use.read, self._store.limit)), scale
         return use, scale
 
-    def _kind(self, use: Texture) -> str:
+    def _kind(self, use: SourceTexture) -> str:
         """ "heights", "normals" or ""."""
         if use.read not in self._kinds:
             self._kinds[use.read] = ""
@@ -142,8 +144,8 @@ class NormalMaps:
                 self._note(use, fault.message if isinstance(fault, PtmError) else str(fault))
         return self._kinds[use.read]
 
-    def _note(self, use: Texture, message: str) -> None:
-        self._findings.note("PTM-N215", f"{use.what}: {message}", use.place)
+    def _note(self, use: SourceTexture, message: str) -> None:
+        self._notes.note("PTM-N215", f"{use.what}: {message}", use.place)
 
 
 def kind_of(texels: NDArray[Any]) -> str:

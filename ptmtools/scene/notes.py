@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Camera, Note
-from ptmtools.scene.reference import Folder
+from ptmtools.scene.reference import ModelFolder
 
 #: Codes of warnings in the order of printing, the most serious first: orientation and unit, which
 #: make all numbers wrong; a model that is inside out; missing materials and images; missing faces
@@ -42,7 +42,7 @@ RUNNER_UP = "PTM-N238"
 OF_ROOMS = ("PTM-N235", "PTM-N236")
 
 
-class Findings:
+class IngestNotes:
     """The notes of one ingest, and the folder in which its files are looked up.
 
     A *miss* is a note on something that the model requires and that is unavailable: a file, a
@@ -52,7 +52,7 @@ class Findings:
 
     def __init__(self, model: Path, allow_outside: bool = False) -> None:
         self.model = model
-        self.folder = Folder(model.absolute().parent, allow_outside)
+        self.folder = ModelFolder(model.absolute().parent, allow_outside)
         self._notes: dict[tuple[str, str, str], int] = {}
         self._misses: dict[tuple[str, str, str], None] = {}
         self._required = True
@@ -86,7 +86,7 @@ class Findings:
         base: Path | None = None,
         hint: str = "",
     ) -> Path | None:
-        """`Folder.find` with a note if the file is elsewhere, outside or missing.
+        """`ModelFolder.find` with a note if the file is elsewhere, outside or missing.
 
         ``what`` begins the message, ``hint`` ends it if the file is missing.
         """
@@ -130,7 +130,7 @@ class Findings:
             (self.miss if missed else self.note)(code, message, place, count)
 
     @property
-    def notes(self) -> tuple[Note, ...]:
+    def entries(self) -> tuple[Note, ...]:
         return tuple(Note(*key, count) for key, count in self._notes.items())
 
     def enforce(self) -> None:

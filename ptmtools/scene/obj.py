@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from io import TextIOWrapper
 from pathlib import Path
@@ -21,21 +21,22 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import luminance
+from ptmtools.scene.formats import MAX_VERTICES, too_many_triangles
 from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
-    MAX_VERTICES,
     FileRange,
+    ModelSource,
     NormalTexture,
-    Source,
     SourceMaterial,
-    Texture,
-    too_many_triangles,
+    SourceTexture,
     vertex_colors,
 )
 
@@ -49,53 +50,29 @@ def library_names(text: str) -> list[str]:
 
 
 def resolve_materials(
-    path: Path,
-    libraries: Iterable[tuple[str, int]],
-    named: Mapping[str, tuple[int, int]],
-    used: Set[int],
-    findings: Findings,
-    *,
-    normals: bool = True,
+    path: Path, statements: _Statements, notes: IngestNotes, *, normals: bool
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
-    """The materials of an OBJ file, and the map_Kd statements by number of material.
-
-    Parameters
-    ----------
-    libraries: text and line of each mtllib statement.
-    named: by name of material, in order: its number, and the line of the first usemtl.
-    used: numbers of the materials of faces; the images of others are not looked up.
-    normals: whether materials have normal maps.
+    """The materials of an OBJ file, with normal maps if ``normals``, and the map_Kd statements by
+    number of material. Only images of materials with faces are looked up.
 
     Raises the errors of `read_mtl`.
     """
-    defined: dict[str, MtlMaterial] = {}
-    read: set[Path] = set()
-    for text, line in libraries:
-        place = f"{path.name}:{line}"
-        for name in library_names(text):
-            missing = findings.folder.find(name).path is None
-            hint = _renaming_hint(path, name) if missing else ""
-            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203", hint=hint)
-            if file is None or (real := file.resolve()) in read:
-                continue
-            read.add(real)
-            for key, block in read_mtl(file, findings).items():
-                defined.setdefault(key, block)
-
+    defined = _library_materials(path, statements.libraries, notes)
+    used = set(statements.face_material)
     materials: list[SourceMaterial] = []
     maps: dict[int, MapStatement] = {}
-    for name, (index, line) in named.items():
+    for name, (index, line) in statements.materials.items():
         material = defined.get(name)
         if material is None:
             if name and index in used:
-                findings.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
+                notes.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
             materials.append(SourceMaterial(name or "default"))
             continue
         texture = mask = normal = None
         if index in used:
-            texture = _texture(material, "map_Kd", material.map_kd, findings)
-            mask = _texture(material, "map_d", material.map_d, findings)
-            normal = _normal(material, texture, findings) if normals else None
+            texture = _texture(material, "map_Kd", material.map_kd, notes)
+            mask = _texture(material, "map_d", material.map_d, notes)
+            normal = _normal(material, texture, notes) if normals else None
         if texture is not None and material.map_kd is not None:
             maps[index] = material.map_kd
         materials.append(
@@ -109,20 +86,41 @@ def resolve_materials(
                 mask=mask,
                 shine=_shine(material),
                 normal=normal,
-                **_glow(material, findings, index in used),
+                **_glow(material, notes, index in used),
             )
         )
     return tuple(materials), maps
 
 
+def _library_materials(
+    path: Path, libraries: Iterable[tuple[str, int]], notes: IngestNotes
+) -> dict[str, MtlMaterial]:
+    """The materials of the libraries by name, the first of each; ``libraries``: text and line of
+    each mtllib statement."""
+    defined: dict[str, MtlMaterial] = {}
+    read: set[Path] = set()
+    for text, line in libraries:
+        place = f"{path.name}:{line}"
+        for name in library_names(text):
+            missing = notes.folder.find(name).path is None
+            hint = _renaming_hint(path, name) if missing else ""
+            file = notes.locate(name, f"mtllib {name}", place, "PTM-N203", hint=hint)
+            if file is None or (real := file.resolve()) in read:
+                continue
+            read.add(real)
+            for key, block in read_mtl(file, notes).items():
+                defined.setdefault(key, block)
+    return defined
+
+
 def _normal(
-    material: MtlMaterial, texture: Texture | None, findings: Findings
+    material: MtlMaterial, texture: SourceTexture | None, notes: IngestNotes
 ) -> NormalTexture | None:
     """The normal map of a material; with the coordinates as written if it has no ``texture``."""
     if material.relief is None:
         return None
     key, statement = material.relief
-    image = _texture(material, key, statement, findings)
+    image = _texture(material, key, statement, notes)
     if image is None:
         return None
     return NormalTexture(image, statement.strength, height=key != "norm", own=texture is None)
@@ -138,7 +136,7 @@ def _shine(material: MtlMaterial) -> Shine | None:
     return Shine(reflection.file, base, "" if same else "other texture coordinates")
 
 
-def _glow(material: MtlMaterial, findings: Findings, used: bool) -> dict[str, Any]:
+def _glow(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
     """The emission of a material, as the fields of a `SourceMaterial`. ``Ke`` is a factor of
     ``map_Ke``; without ``Ke`` it is 1. An image that is missing counts as white."""
     factor = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
@@ -148,9 +146,9 @@ def _glow(material: MtlMaterial, findings: Findings, used: bool) -> dict[str, An
     image = None
     if material.map_ke is not None:
         base, name = material.library.parent, material.map_ke.file
-        file = findings.folder.find(name, base).path
-        place = f"{findings.folder.label(material.library)}:{material.map_ke.line}"
-        image = file and Texture(FileRange(file), file.name, f"map_Ke {name}", place)
+        file = notes.folder.find(name, base).path
+        place = f"{notes.folder.label(material.library)}:{material.map_ke.line}"
+        image = file and SourceTexture(FileRange(file), file.name, f"map_Ke {name}", place)
     return {"glow": glow, "glow_map": image}
 
 
@@ -163,25 +161,25 @@ def _renaming_hint(path: Path, name: str) -> str:
 
 
 def _texture(
-    material: MtlMaterial, key: str, statement: MapStatement | None, findings: Findings
-) -> Texture | None:
+    material: MtlMaterial, key: str, statement: MapStatement | None, notes: IngestNotes
+) -> SourceTexture | None:
     if statement is None:
         return None
-    place = f"{findings.folder.label(material.library)}:{statement.line}"
+    place = f"{notes.folder.label(material.library)}:{statement.line}"
     what = f"{key} {statement.file}"
-    file = findings.locate(statement.file, what, place, base=material.library.parent)
+    file = notes.locate(statement.file, what, place, base=material.library.parent)
     if file is None:
         return None
     if statement.ignored:
-        findings.note("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
+        notes.note("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
     transform, colors = (statement.scale, statement.offset), material.map_kd
     if transform != ((1.0, 1.0), (0.0, 0.0)):
         if key == "map_Kd":
-            findings.note("PTM-N215", f"{what}: -s and -o baked into its faces", place)
+            notes.note("PTM-N215", f"{what}: -s and -o baked into its faces", place)
         elif colors is None or transform != (colors.scale, colors.offset):
-            findings.note("PTM-N215", f"{what}: ignored -s -o", place)
+            notes.note("PTM-N215", f"{what}: ignored -s -o", place)
     wrap: Wrap = "clamp" if statement.clamp else "repeat"
-    return Texture(
+    return SourceTexture(
         read=FileRange(file),
         label=file.name,
         what=what,
@@ -211,8 +209,16 @@ _MARK = "\u00ef\u00bb\u00bf"
 
 @dataclass
 class _Statements:
-    """The statements of a file as flat arrays, and the number and first line of each material."""
+    """The statements of a file as flat arrays; ``stem`` names objects without a name.
 
+    Attributes
+    ----------
+    materials: number and first line of each by name.
+    short: lines of faces of fewer than three corners.
+    unknown: lines of other statements by keyword.
+    """
+
+    stem: str
     points: array[float] = field(default_factory=lambda: array("d"))
     colored: array[int] = field(default_factory=lambda: array("q"))
     colors: array[float] = field(default_factory=lambda: array("d"))
@@ -227,27 +233,88 @@ class _Statements:
     materials: dict[str, tuple[int, int]] = field(default_factory=dict)
     libraries: list[tuple[str, int]] = field(default_factory=list)
     unknown: dict[str, list[int]] = field(default_factory=dict)
+    short: list[int] = field(default_factory=list)
+    _object_name: str = ""
+    _group_name: str = ""
+    _object: int = -1
+    _material: int = -1
+
+    def add(self, words: list[str], line: str, number: int) -> None:
+        """Adds a statement; ``line`` is its text and ``number`` its place.
+
+        Raises ValueError, IndexError or OverflowError for an invalid one.
+        """
+        key = words[0]
+        if key == "v":
+            if len(words) >= 7:
+                self.colored.append(len(self.points) // 3)
+                self.colors.extend(map(float, words[4:7]))
+            self.points.extend(map(float, words[1:4]))
+            if len(words) < 4:
+                raise ValueError("a vertex has three coordinates")
+        elif key == "vt":
+            self.coords.append(float(words[1]))
+            self.coords.append(float(words[2]) if len(words) > 2 else 0.0)
+        elif key == "f":
+            self._add_face(words, number)
+        elif key == "usemtl":
+            self._use_material(_rest(line, "usemtl"), number)
+        elif key == "o":
+            self._object_name, self._group_name, self._object = _rest(line, "o"), "", -1
+        elif key == "g":
+            self._group_name, self._object = _rest(line, "g"), -1
+        elif key == "mtllib":
+            self.libraries.append((_rest(line, "mtllib"), number))
+        elif key not in _SILENT:
+            if "\0" in line:
+                raise ValueError("binary data")
+            self.unknown.setdefault(key[:40], []).append(number)
+
+    def _use_material(self, name: str, number: int) -> None:
+        self._material, _ = self.materials.setdefault(name, (len(self.materials), number))
+
+    def _add_face(self, words: list[str], number: int) -> None:
+        """Adds a face of corners ``p``, ``p/t``, ``p//n`` or ``p/t/n``; -1 is the last one."""
+        if len(words) < 4:
+            self.short.append(number)
+            return
+        if self._object < 0:
+            name = "/".join(part for part in (self._object_name, self._group_name) if part)
+            self._object = self.objects.setdefault(name or self.stem, len(self.objects))
+        if self._material < 0:
+            self._use_material("", number)
+        for word in words[1:]:
+            parts = word.split("/")
+            point = int(parts[0])
+            coord = int(parts[1]) if len(parts) > 1 and parts[1] else None
+            if point < 0:
+                point += len(self.points) // 3 + 1
+            if coord is not None and coord < 0:
+                coord += len(self.coords) // 2 + 1
+            if point < 1 or (coord is not None and coord < 1):
+                raise ValueError(f"{word} is 0 or before the first one")
+            self.corner_point.append(point - 1)
+            self.corner_coord.append(-1 if coord is None else coord - 1)
+        self.face_start.append(len(self.corner_point))
+        self.face_line.append(number)
+        self.face_object.append(self._object)
+        self.face_material.append(self._material)
 
 
 def read_obj(
-    path: Path,
-    findings: Findings,
-    progress: Progress = silent,
-    max_triangles: int = MAX_VERTICES,
-    *,
-    normals: bool = True,
-) -> Source:
-    """Reads an OBJ file with its materials, and their normal maps if it reads ``normals``.
+    path: Path, notes: IngestNotes, options: IngestOptions, progress: Progress = silent
+) -> ModelSource:
+    """Reads an OBJ file with its materials.
 
     Raises InputError with the line of an invalid statement, and for a file without faces;
     LimitError for more vertices than int32 can number (PTM-L203), a line longer than `LONGEST_LINE`
-    (PTM-L204), more than ``max_triangles`` (PTM-L203, before polygons are cut), and the errors of
+    (PTM-L204), too many triangles (PTM-L203, before polygons are cut), and the errors of
     `read_mtl`.
     """
-    statements = _read_statements(path, findings, progress, max_triangles)
+    statements = _read_statements(path, notes, progress, options.max_triangles)
     for key, lines in statements.unknown.items():
         kind = _NOT_DRAWN.get(key, "unknown statement")
-        findings.note("PTM-N215", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
+        notes.note("PTM-N215", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
     if not statements.face_line:
         unknown = next(iter(statements.unknown.values()), None)
         garbage = None if statements.points else unknown
@@ -259,58 +326,33 @@ def read_obj(
             remedy="use a model with f statements",
         )
     start = np.frombuffer(statements.face_start, dtype=np.int64)
-    line = np.frombuffer(statements.face_line, dtype=np.int64)
     points = np.frombuffer(statements.points, dtype=np.float64).reshape(-1, 3)
-    coords = np.frombuffer(statements.coords, dtype=np.float64).reshape(-1, 2)
     corner_point = np.frombuffer(statements.corner_point, dtype=np.int64)
     corner_coord = np.frombuffer(statements.corner_coord, dtype=np.int64)
-    for corner, count, item in (
-        (corner_point, len(points), "vertex"),
-        (corner_coord, len(coords), "texture coordinate"),
-    ):
-        invalid = np.flatnonzero(corner >= count)
-        if len(invalid):
-            face = int(np.searchsorted(start, invalid[0], side="right")) - 1
-            raise InputError(
-                "PTM-I245",
-                f"{item} {corner[invalid[0]] + 1} of {count} does not exist",
-                file=path,
-                place=f"line {line[face]}",
-                remedy="the file may be truncated",
-            )
-
+    _check_corners(path, statements, corner_point, len(points), "vertex")
+    coord_count = len(statements.coords) // 2
+    _check_corners(path, statements, corner_coord, coord_count, "texture coordinate")
     cut = triangulate(points[corner_point], start)
-    cut.note(findings, path.name)
+    cut.note(notes, path.name)
+    normals = options.normal_maps == "draw"
+    materials, maps = resolve_materials(path, statements, notes, normals=normals)
+    triangle_material = np.frombuffer(statements.face_material, dtype=np.int64)[cut.polygon]
     coord = corner_coord[cut.corner]
-    uv = np.zeros((len(coord), 3, 2))
-    uv[coord >= 0] = coords[coord[coord >= 0]]
-    face_material = np.frombuffer(statements.face_material, dtype=np.int64)
-    used = set(np.unique(face_material).tolist())
-    materials, maps = resolve_materials(
-        path, statements.libraries, statements.materials, used, findings, normals=normals
-    )
-    triangle_material = face_material[cut.polygon]
-    ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
-    grouped = np.split(np.argsort(triangle_material, kind="stable"), ends[:-1])
-    for index, statement in maps.items():
-        rows = grouped[index]
-        uv[rows] = uv[rows] * statement.scale + statement.offset
-        bare = np.unique(cut.polygon[rows[(coord[rows] < 0).any(axis=1)]])
-        if len(bare):
-            findings.note(
-                "PTM-N229",
-                f"faces of textured material {materials[index].name} have no texture coordinates",
-                f"{path.name}:{line[bare[0]]}",
-                len(bare),
-            )
+    uv = _texture_coordinates(statements, coord, triangle_material, maps)
+    bare = np.flatnonzero((coord < 0).any(axis=1))
+    for index in sorted(maps.keys() & set(triangle_material[bare].tolist())):
+        faces = np.unique(cut.polygon[bare[triangle_material[bare] == index]])
+        name, place = materials[index].name, f"{path.name}:{statements.face_line[faces[0]]}"
+        message = f"faces of textured material {name} have no texture coordinates"
+        notes.note("PTM-N229", message, place, len(faces))
     triangles = corner_point[cut.corner]
-    own = any(material.normal and material.normal.own for material in materials)
     colors = None
     if statements.colored:
         colored = np.frombuffer(statements.colored, dtype=np.int64)
         values = np.frombuffer(statements.colors, dtype=np.float64).reshape(-1, 3)
         materials, colors = vertex_colors(materials, triangles, triangle_material, colored, values)
-    return Source(
+    separate = any(material.normal and material.normal.own for material in materials)
+    return ModelSource(
         points=points,
         triangles=triangles,
         uv=uv,
@@ -319,8 +361,46 @@ def read_obj(
         objects=tuple(statements.objects),
         materials=materials,
         colors=colors,
-        normal_uv=uv if own else None,
+        normal_uv=uv if separate else None,
     )
+
+
+def _check_corners(
+    path: Path, statements: _Statements, corner: Ints, count: int, item: str
+) -> None:
+    """Raises InputError PTM-I245 if a corner refers to none of the ``count`` items."""
+    invalid = np.flatnonzero(corner >= count)
+    if len(invalid):
+        face = int(np.searchsorted(statements.face_start, invalid[0], side="right")) - 1
+        raise InputError(
+            "PTM-I245",
+            f"{item} {corner[invalid[0]] + 1} of {count} does not exist",
+            file=path,
+            place=f"line {statements.face_line[face]}",
+            remedy="the file may be truncated",
+        )
+
+
+def _texture_coordinates(
+    statements: _Statements,
+    coord: Ints,
+    triangle_material: Ints,
+    maps: Mapping[int, MapStatement],
+) -> Floats:
+    """(T, 3, 2) coordinates of triangles whose corners have the numbers ``coord``, (T, 3), or -1,
+    with -s and -o of their materials; 0 without coordinates."""
+    coords = np.frombuffer(statements.coords, dtype=np.float64).reshape(-1, 2)
+    uv = np.zeros((len(coord), 3, 2))
+    uv[coord >= 0] = coords[coord[coord >= 0]]
+    count = len(statements.materials)
+    scale, offset = np.ones((count, 2)), np.zeros((count, 2))
+    mapped = np.zeros(count, dtype=bool)
+    for index, statement in maps.items():
+        mapped[index], scale[index], offset[index] = True, statement.scale, statement.offset
+    rows = np.flatnonzero(mapped[triangle_material])
+    material = triangle_material[rows]
+    uv[rows] = uv[rows] * scale[material, None] + offset[material, None]
+    return uv
 
 
 def _name(text: str) -> str:
@@ -364,15 +444,10 @@ def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _read_statements(
-    path: Path, findings: Findings, progress: Progress, max_triangles: int
+    path: Path, notes: IngestNotes, progress: Progress, max_triangles: int
 ) -> _Statements:
-    statements = _Statements()
-    points, coords = statements.points, statements.coords
+    statements = _Statements(path.stem)
     size = path.stat().st_size
-    object_name = group_name = ""
-    object_index = material_index = -1
-    short: list[int] = []
-
     with open(path, "rb") as raw, TextIOWrapper(raw, encoding="latin-1") as stream:
         for number, line in _logical_lines(stream, path):
             if not number % _LINES_A_TICK:
@@ -380,55 +455,12 @@ def _read_statements(
             if number == 1:
                 line = line.removeprefix(_MARK)
             words = line.split()
-            if not words:
+            if not words or words[0].startswith("#"):
                 continue
-            key = words[0]
-            if key.startswith("#"):
-                continue
-            if key in ("v", "vt", "f") and "#" in line:
+            if words[0] in ("v", "vt", "f") and "#" in line:
                 words = line[: line.index("#")].split()
             try:
-                if key == "v":
-                    if len(words) >= 7:
-                        statements.colored.append(len(points) // 3)
-                        statements.colors.extend(map(float, words[4:7]))
-                    points.extend(map(float, words[1:4]))
-                    if len(words) < 4:
-                        raise ValueError("a vertex has three coordinates")
-                elif key == "vt":
-                    coords.append(float(words[1]))
-                    coords.append(float(words[2]) if len(words) > 2 else 0.0)
-                elif key == "f":
-                    if len(words) < 4:
-                        short.append(number)
-                        continue
-                    if object_index < 0:
-                        name = "/".join(part for part in (object_name, group_name) if part)
-                        object_index = statements.objects.setdefault(
-                            name or path.stem, len(statements.objects)
-                        )
-                    if material_index < 0:
-                        unnamed = len(statements.materials), number
-                        material_index, _ = statements.materials.setdefault("", unnamed)
-                    _face(statements, words)
-                    statements.face_line.append(number)
-                    statements.face_object.append(object_index)
-                    statements.face_material.append(material_index)
-                    if len(statements.corner_point) - 2 * len(statements.face_line) > max_triangles:
-                        raise too_many_triangles(max_triangles, path)
-                elif key == "usemtl":
-                    name, new = _rest(line, "usemtl"), (len(statements.materials), number)
-                    material_index, _ = statements.materials.setdefault(name, new)
-                elif key == "o":
-                    object_name, group_name, object_index = _rest(line, "o"), "", -1
-                elif key == "g":
-                    group_name, object_index = _rest(line, "g"), -1
-                elif key == "mtllib":
-                    statements.libraries.append((_rest(line, "mtllib"), number))
-                elif key not in _SILENT:
-                    if "\0" in line:
-                        raise ValueError("binary data")
-                    statements.unknown.setdefault(key[:40], []).append(number)
+                statements.add(words, line, number)
             except (ValueError, IndexError, OverflowError) as error:
                 raise InputError(
                     "PTM-I245",
@@ -437,30 +469,16 @@ def _read_statements(
                     file=path,
                     place=f"line {number}",
                 ) from None
-    if len(points) // 3 > MAX_VERTICES:
+            if words[0] == "f":
+                triangles = len(statements.corner_point) - 2 * len(statements.face_line)
+                if triangles > max_triangles:
+                    raise too_many_triangles(max_triangles, path)
+    if len(statements.points) // 3 > MAX_VERTICES:
         raise LimitError(
             "PTM-L203", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
         )
-    if short:
-        findings.miss(
-            "PTM-N214", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)
-        )
+    if short := statements.short:
+        message = "faces of fewer than three corners"
+        notes.miss("PTM-N214", message, f"{path.name}:{short[0]}", len(short))
     progress(size, size, "reading")
     return statements
-
-
-def _face(statements: _Statements, words: list[str]) -> None:
-    """Appends the corners of a face: ``p``, ``p/t``, ``p//n`` or ``p/t/n``; -1 is the last one."""
-    for word in words[1:]:
-        parts = word.split("/")
-        point = int(parts[0])
-        coord = int(parts[1]) if len(parts) > 1 and parts[1] else None
-        if point < 0:
-            point += len(statements.points) // 3 + 1
-        if coord is not None and coord < 0:
-            coord += len(statements.coords) // 2 + 1
-        if point < 1 or (coord is not None and coord < 1):
-            raise ValueError(f"{word} is 0 or before the first one")
-        statements.corner_point.append(point - 1)
-        statements.corner_coord.append(-1 if coord is None else coord - 1)
-    statements.face_start.append(len(statements.corner_point))

@@ -1,4 +1,4 @@
-"""Options of ingest, and the supported file formats."""
+"""Options of ingest."""
 
 from __future__ import annotations
 
@@ -7,15 +7,6 @@ from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
 from ptmtools.options import option
-
-#: Suffixes of model files, by reader: ptmtools, trimesh, pymeshlab, IfcOpenShell, usd-core.
-GLTF = (".glb", ".gltf")
-OWN = (".obj", *GLTF)
-TRIMESH = (".ply", ".stl", ".off")
-MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
-IFC = (".ifc", ".ifczip")
-USD = (".usd", ".usda", ".usdc", ".usdz")
-SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *IFC, *USD)
 
 
 @dataclass(frozen=True)

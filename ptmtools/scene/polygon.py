@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.tolerance import ROUNDING_SHARE
 
 #: Budget of clipping steps (one tested corner, about 3 ns): constant, and per corner of an outline.
@@ -44,11 +44,11 @@ class Triangulation:
     polygon: NDArray[np.int64]
     tangled: int
 
-    def note(self, findings: Findings, place: str) -> None:
+    def note(self, notes: IngestNotes, place: str) -> None:
         """Notes tangled polygons."""
         if self.tangled:
             message = "polygons with crossing edges or too many corners cut into fans of triangles"
-            findings.note("PTM-N211", message, place, self.tangled)
+            notes.note("PTM-N211", message, place, self.tangled)
 
 
 def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Triangulation:

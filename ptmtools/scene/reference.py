@@ -37,7 +37,7 @@ class SearchResult:
     path: Path | None = None
 
 
-class Folder:
+class ModelFolder:
     """The folder of a model, searched regardless of case if the exact name does not exist.
 
     Attributes

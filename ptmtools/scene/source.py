@@ -1,6 +1,6 @@
 """The output of a reader: triangles, materials and textures in the units and axes of the file.
 
-`Rows` collects the triangles mesh by mesh, with all instances of each mesh.
+`MeshArrays` collects the triangles mesh by mesh, with all instances of each mesh.
 
 A reader resolves the names of textures to files but opens no image: only the cleaning of the faces
 (`faces`) shows which images some face uses.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,14 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
+from ptmtools.scene.faces import keep_faces
 from ptmtools.scene.lights import Lamp
-from ptmtools.scene.model import Camera, Kind, RoomVolume, Shine, Storey, Wrap
+from ptmtools.scene.model import Camera, Kind, Note, RoomVolume, Shine, Storey, Wrap
 
 SourceWrap = Literal[Wrap, "mirror"]
-#: `Scene.triangles` is int32: more vertices cannot be numbered.
-MAX_VERTICES = 2**31 - 1
 
 
 def decode(raw: bytes) -> str:
@@ -34,16 +33,6 @@ def decode(raw: bytes) -> str:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         return raw.decode("latin-1")
-
-
-def too_many_triangles(limit: int, file: Path) -> LimitError:
-    """The error for a model of more triangles than the limit, PTM-L203."""
-    return LimitError(
-        "PTM-L203",
-        f"has more than {limit:,} triangles",
-        file=file,
-        remedy="raise the limit (--max-triangles), or split the model",
-    )
 
 
 @dataclass(frozen=True)
@@ -76,7 +65,7 @@ class HeldBytes:
 
 
 @dataclass(frozen=True)
-class Texture:
+class SourceTexture:
     """A reference of a material to an image.
 
     Attributes
@@ -110,10 +99,10 @@ class NormalTexture:
     texture: its image, or that of heights.
     scale: factor of x and y of the normals; of heights, see `height`.
     height: whether the image holds heights if it is grey (``bump`` of OBJ).
-    own: whether its coordinates are those of `Source.normal_uv`.
+    own: whether its coordinates are those of `ModelSource.normal_uv`.
     """
 
-    texture: Texture
+    texture: SourceTexture
     scale: float = 1.0
     height: bool = False
     own: bool = False
@@ -146,17 +135,17 @@ class SourceMaterial:
     ignores_alpha: bool = False
     cutoff: float | None = None
     two_sided: bool = True
-    texture: Texture | None = None
-    mask: Texture | None = None
+    texture: SourceTexture | None = None
+    mask: SourceTexture | None = None
     shine: Shine | None = None
     normal: NormalTexture | None = None
     unlit: bool = False
     glow: float = 0.0
-    glow_map: Texture | None = None
+    glow_map: SourceTexture | None = None
 
 
 @dataclass(frozen=True)
-class Source:
+class ModelSource:
     """Triangles in the units and axes of the file.
 
     Fields that a format does not define keep their defaults.
@@ -199,8 +188,34 @@ class Source:
     lamps: tuple[Lamp, ...] = ()
 
 
+@dataclass(frozen=True)
+class SecondReading:
+    """A model with other textures in place of the colours of its materials.
+
+    Attributes
+    ----------
+    source: the file; coordinates are NaN where it has none for the texture.
+    asked: for each of its materials, whether it names such a texture.
+    missing: notes on missing and damaged textures, in the order of the materials.
+    sought: the files that were looked for, as `Scene.files`.
+    """
+
+    source: ModelSource
+    asked: tuple[bool, ...]
+    missing: tuple[Note, ...]
+    sought: tuple[str, ...]
+
+    @cached_property
+    def faces(self) -> Ints:
+        """(T,) the faces that are in the scene: they are cleaned as those of the scene."""
+        return keep_faces(self.source.points, self.source.triangles).source
+
+
+_IDENTITY = np.eye(4)[None]
+
+
 @dataclass
-class Rows:
+class MeshArrays:
     """The arrays of a source, one entry for each mesh."""
 
     points: list[Floats] = field(default_factory=list)
@@ -213,28 +228,36 @@ class Rows:
     names: list[str] = field(default_factory=list)
     count: int = 0
 
+    def add_objects(self, name: str, count: int = 1) -> int:
+        """Adds objects of one name; returns the number of the first."""
+        self.names += [name] * count
+        return len(self.names) - count
+
     def add(
         self,
-        frames: Floats,
+        first_object: int,
         points: Floats,
         triangles: Ints,
-        uv: Floats,
-        material: Ints | int,
-        colors: NDArray[np.uint8] | None,
-        first_object: int,
+        *,
+        frames: Floats = _IDENTITY,
+        uv: Floats | None = None,
+        material: Ints | int = 0,
+        colors: NDArray[np.uint8] | None = None,
         normal_uv: Floats | None = None,
     ) -> None:
         """Adds the instances of a mesh.
 
         Parameters
         ----------
-        frames: (k, 4, 4) from the mesh to the model.
-        points, triangles: (p, 3) and (t, 3) over these.
-        uv, normal_uv: (t, 3, 2). colors: (t, 3, 3), see `Source`.
-        material: (t,), or one number for all.
         first_object: the object of the first instance; the others follow.
+        points, triangles: (p, 3) and (t, 3) over these.
+        frames: (k, 4, 4) from the mesh to the model, of each instance.
+        uv, normal_uv: (t, 3, 2), 0 without. colors: (t, 3, 3), see `ModelSource`.
+        material: (t,), or one number for all.
         """
         k, p, t = len(frames), len(points), len(triangles)
+        if uv is None:
+            uv = np.zeros((t, 3, 2))
         with np.errstate(all="ignore"):
             placed = points @ frames[:, :3, :3].transpose(0, 2, 1) + frames[:, None, :3, 3]
             mirrored = np.linalg.det(frames[:, :3, :3]) < 0
@@ -250,9 +273,14 @@ class Rows:
         self.material.append(np.tile(np.broadcast_to(material, t), k))
         self.count += k * p
 
-    def source(self, **others: Any) -> Source:
-        """The source of all meshes, white where a mesh has no colours and another has; ``others``
-        are the remaining fields of a `Source`."""
+    def source(
+        self,
+        *,
+        materials: tuple[SourceMaterial, ...] = (SourceMaterial("default"),),
+        **fields: Any,
+    ) -> ModelSource:
+        """The source of all meshes, white where a mesh has no colours and another has; ``fields``
+        are the remaining ones of a `ModelSource`."""
         colors = None
         if any(part is not None for part in self.colors):
             parts = zip(self.colors, self.triangles, strict=True)
@@ -263,16 +291,17 @@ class Rows:
         if any(part is not None for part in self.normal_uv):
             pairs = zip(self.normal_uv, self.uv, strict=True)
             normal_uv = np.concatenate([np.zeros_like(uv) if n is None else n for n, uv in pairs])
-        return Source(
+        return ModelSource(
             points=np.concatenate(self.points),
             triangles=np.concatenate(self.triangles),
             uv=np.concatenate(self.uv),
             triangle_object=np.concatenate(self.object),
             triangle_material=np.concatenate(self.material).astype(np.int64),
             objects=tuple(self.names),
+            materials=materials,
             colors=colors,
             normal_uv=normal_uv,
-            **others,
+            **fields,
         )
 
 

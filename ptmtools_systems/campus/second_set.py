@@ -2,15 +2,14 @@
 "Sources by format").
 
 A mask has the texture coordinates of the colours, or is left out. For OBJ, the scene's own reader
-names the masks. A glTF is read a second time (`read_again`).
+names the masks. A glTF is read a second time (`ModelFormat.second`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +17,11 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError, PtmError
 from ptmtools.light.looks import LightImage, red_texels
-from ptmtools.scene.gltf.second import SecondReading, read_again
+from ptmtools.scene.formats import format_of
 from ptmtools.scene.model import Scene
-from ptmtools.scene.options import GLTF, IngestOptions
-from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import FileRange, Texture
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.reference import ModelFolder
+from ptmtools.scene.source import FileRange, SecondReading, SourceTexture
 from ptmtools_systems.campus.textures import Mask
 
 #: Reasons for leaving out a file that a model names.
@@ -51,9 +50,8 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
     Raises InputError: PTM-I701 it has none, its format has none, or one that it names is missing;
     and as reading and decoding.
     """
-    read = None
-    if model.suffix.lower() in GLTF:
-        read = read_again(model, options, lambda entry: entry.get("occlusionTexture"))
+    second = format_of(model).second
+    read = second.load()(model, options, "lightmap") if second else None
     if read is None:
         raise InputError(
             "PTM-I701",
@@ -100,7 +98,7 @@ def _missing(model: Path, material: str, number: int, read: SecondReading) -> In
     )
 
 
-def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
+def _red(texture: SourceTexture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
     """(h, w) red samples of a lightmap. Raises as decoding, and InputError PTM-I122."""
     try:
         return red_texels(texture.read(), options.limit << 20, texture.label)
@@ -119,9 +117,15 @@ def model_masks(
 ) -> tuple[dict[int, Mask], tuple[str, ...]]:
     """The masks of a model that was read as ``scene``, by the number of its material, and notes on
     invalid ones."""
-    masks_of = _gltf_masks if model.suffix.lower() in GLTF else _obj_masks
+    second = format_of(model).second
+    if second is None:
+        candidates = _named_masks(model, scene, options)
+    elif read := second.load()(model, options, "reflection"):
+        candidates = _second_masks(read, scene)
+    else:
+        candidates = iter(())
     masks, notes = {}, []
-    for number, label, mask in masks_of(model, scene, options):
+    for number, label, mask in candidates:
         if fault := mask if isinstance(mask, str) else _fault(mask, options):
             name = scene.materials[number].name
             notes.append(f"the mask of material {name} is left out: {label}{fault}")
@@ -134,12 +138,8 @@ def model_masks(
 _Candidates = Iterator[tuple[int, str, Mask | str]]
 
 
-def _gltf_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
-    def glossy(entry: Mapping[str, Any]) -> Any:
-        return entry.get("pbrMetallicRoughness", {}).get("metallicRoughnessTexture")
-
-    if (read := read_again(model, options, glossy)) is None:
-        return
+def _second_masks(read: SecondReading, scene: Scene) -> _Candidates:
+    """The masks of a second reading."""
     source, faces = read.source, read.faces
     material = source.triangle_material[faces]
     for number, index in enumerate(np.unique(material).tolist()):
@@ -154,9 +154,9 @@ def _gltf_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidate
             yield number, "", Mask(texture.read, texture.label, band=1, inverted=True)
 
 
-def _obj_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
+def _named_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
     """The masks that the scene's own reader names."""
-    folder = Folder(model.absolute().parent, options.allow_outside)
+    folder = ModelFolder(model.absolute().parent, options.allow_outside)
     for number, (own, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
         if own.image < 0 or shine is None:
             continue

@@ -13,7 +13,7 @@ from ptmtools.output.gltf import unpack
 from ptmtools.texture.images.png import png_bytes
 from tests.e2e.conftest import Ptm
 from tests.scene.buildings import house, welded, y_up
-from tests.scene.conftest import Gltf
+from tests.scene.conftest import GltfModel
 
 COLORS = np.random.default_rng(3).integers(0, 255, (16, 16, 3), dtype=np.uint8)
 CLEAR = np.concatenate([COLORS, np.full((16, 16, 1), 40, np.uint8)], axis=2)
@@ -22,7 +22,7 @@ CLEAR = np.concatenate([COLORS, np.full((16, 16, 1), 40, np.uint8)], axis=2)
 def model(pixels: np.ndarray, mode: str | None) -> bytes:
     """A house of several rooms, all of one material."""
     points, faces = welded(y_up(house()))
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["images"] = [
         {"bufferView": doc.view(png_bytes(pixels)), "mimeType": "image/png", "name": "wall"}
     ]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Floats
-from tests.scene.conftest import Gltf, png
+from tests.scene.conftest import GltfModel, png
 from tests.systems.apo.meshes import sphere
 
 SIDE, HEIGHT = 6.0, 3.0
@@ -56,7 +56,7 @@ def tiles() -> np.ndarray:
 def write_lit_room(folder: Path, *, ball: int = 0, **material: Any) -> Path:
     """lit.glb; the ball has 20 · 4^``ball`` faces, 0 for none. ``material``: further fields of the
     material of the sides."""
-    doc = Gltf()
+    doc = GltfModel()
     image = doc.view(png(tiles()))
     doc.tree["images"] = [{"bufferView": image, "mimeType": "image/png"}]
     doc.tree["textures"] = [{"source": 0}]

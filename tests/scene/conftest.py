@@ -14,6 +14,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ptmtools.progress import silent
+from ptmtools.scene import IngestOptions
+from ptmtools.scene.formats import format_of
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import ModelSource
+
 #: A quad of 10 x 4 m, standing, with texture coordinates over the whole image.
 QUAD = """v 0 0 0
 v 10 0 0
@@ -25,6 +31,12 @@ vt 1 1
 vt 0 1
 """
 FACE = "f 1/1 2/2 3/3 4/4\n"
+
+
+def read_source(path: Path, notes: IngestNotes | None = None, **options: Any) -> ModelSource:
+    """What the reader of a file's format returns."""
+    notes = notes or IngestNotes(path)
+    return format_of(path).read(path, notes, IngestOptions(**options), silent)
 
 
 def png(pixels: np.ndarray, **options: Any) -> bytes:
@@ -66,7 +78,7 @@ def textured(put: Put) -> Callable[..., Path]:
     return write
 
 
-class Gltf:
+class GltfModel:
     """Builds a document: ``add`` appends an array and returns its accessor."""
 
     types: ClassVar = {
@@ -88,7 +100,9 @@ class Gltf:
         }
 
     @classmethod
-    def wall(cls, change: Callable[[Gltf], object] = lambda doc: None, **node: Any) -> Gltf:
+    def wall(
+        cls, change: Callable[[GltfModel], object] = lambda doc: None, **node: Any
+    ) -> GltfModel:
         """A quad at one node; then changed."""
         doc = cls()
         doc.place(doc.quad(), **node)
@@ -152,6 +166,6 @@ class Gltf:
         return json.dumps(self.tree).encode()
 
 
-def broken(change: Callable[[Gltf], object]) -> bytes:
+def broken(change: Callable[[GltfModel], object]) -> bytes:
     """The GLB of a wall, changed."""
-    return Gltf.wall(change).glb()
+    return GltfModel.wall(change).glb()

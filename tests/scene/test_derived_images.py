@@ -14,8 +14,8 @@ from PIL import Image
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.baking import bake
 from ptmtools.scene.images import ImageStore
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import FileRange, Source, SourceMaterial, Texture
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import FileRange, ModelSource, SourceMaterial, SourceTexture
 from tests.scene.conftest import Put, noise, png
 
 Textured = Callable[..., Path]
@@ -93,13 +93,15 @@ def test_an_image_of_which_another_is_made_is_not_plain(textured: Textured) -> N
     assert [image.plain for image in alone.images] == [True]
 
 
-def mirrored(put: Put, uv: list[list[float]], limit: int) -> tuple[Source, np.ndarray, Findings]:
+def mirrored(
+    put: Put, uv: list[list[float]], limit: int
+) -> tuple[ModelSource, np.ndarray, IngestNotes]:
     put("a.obj", "")
-    findings = Findings(put("wall.png", png(noise(1, 8))))
+    findings = IngestNotes(put("wall.png", png(noise(1, 8))))
     findings.folder.find("wall.png")
-    texture = Texture(FileRange(findings.model), "wall.png", "wall", "a", "mirror", "mirror")
+    texture = SourceTexture(FileRange(findings.model), "wall.png", "wall", "a", "mirror", "mirror")
     corners = np.array([uv])
-    source = Source(
+    source = ModelSource(
         points=np.zeros((3, 3)),
         triangles=np.array([[0, 1, 2]]),
         uv=corners,
@@ -152,7 +154,7 @@ def test_what_would_be_too_large_repeats(put: Put) -> None:
     assert texture is not None
     assert (texture.wrap_s, texture.wrap_t) == ("repeat", "repeat")
     assert source.uv[0].tolist() == uv
-    assert {note.code for note in findings.notes} == {"PTM-N206"}
+    assert {note.code for note in findings.entries} == {"PTM-N206"}
 
 
 def test_what_could_not_be_made_may_be_when_the_file_changes(textured: Textured) -> None:
@@ -163,10 +165,10 @@ def test_what_could_not_be_made_may_be_when_the_file_changes(textured: Textured)
 
 
 def test_floats_are_not_mirrored(put: Put) -> None:
-    from tests.scene.conftest import Gltf
+    from tests.scene.conftest import GltfModel
     from tests.scene.features.gltf import repeating
 
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(**repeating(doc, [2.5, 2])))
     (view,) = [image["bufferView"] for image in doc.tree["images"]]
     doc.tree["bufferViews"][view] = doc.tree["bufferViews"][
@@ -181,13 +183,14 @@ def test_floats_are_not_mirrored(put: Put) -> None:
 def test_ktx2_without_its_library(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
     """An error: a scene without its textures would stay as it is when the library comes."""
     from ptmtools.errors import MissingComponentError
-    from ptmtools.scene import ktx2, sandbox
+    from ptmtools.scene import sandbox
+    from ptmtools.scene.gltf.compression import TranscodedBytes, transcode
     from tests.scene.features.gltf import KTX2
 
     monkeypatch.setattr(sandbox, "find_spec", lambda name: None)
     with pytest.raises(MissingComponentError, match=r"PTM-M100"):
-        ktx2.transcoded(KTX2)
-    assert ktx2.TranscodedBytes(lambda: b"\x89PNG")() == b"\x89PNG"
+        transcode(KTX2)
+    assert TranscodedBytes(lambda: b"\x89PNG")() == b"\x89PNG"
 
 
 def test_a_mask_counts_for_the_limit(textured: Textured) -> None:

@@ -12,10 +12,8 @@ import pytest
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError
 from ptmtools.scene import ingest, sandbox as apart
-from ptmtools.scene.formats import read_other
-from ptmtools.scene.notes import Findings
 
-from .conftest import Put, noise, png
+from .conftest import Put, noise, png, read_source
 
 CORNERS = "0 0 0\n10 0 0\n10 4 0\n0 4 0\n"
 STL = "solid wall\n" + "".join(
@@ -181,6 +179,6 @@ def test_infinite_coordinates_are_told_of_by_their_code_alone(put: Put) -> None:
 @pytest.mark.parametrize("name", ["wall.stl", "mixed.off"])
 def test_triangles_are_counted(put: Put, pymeshlab: None, name: str) -> None:
     path = put(name, MODELS[name])
-    assert len(read_other(path, Findings(path), 3).triangles) in (2, 3)
+    assert len(read_source(path, max_triangles=3).triangles) in (2, 3)
     with pytest.raises(LimitError, match="PTM-L203"):
-        read_other(path, Findings(path), 1)
+        read_source(path, max_triangles=1)

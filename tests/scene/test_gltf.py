@@ -16,7 +16,7 @@ from PIL import Image
 from ptmtools.errors import InputError, PtmError
 from ptmtools.scene import IngestOptions, Scene, ingest
 
-from .conftest import Gltf, Put, broken, noise, png
+from .conftest import GltfModel, Put, broken, noise, png
 
 
 def codes(scene: Scene) -> set[str]:
@@ -28,13 +28,15 @@ def says(scene: Scene, words: str) -> bool:
     return any(words in note.message for note in scene.notes if note.code == "PTM-N215")
 
 
-def with_material(doc: Gltf, material: dict[str, Any], **primitive: Any) -> Gltf:
+def with_material(doc: GltfModel, material: dict[str, Any], **primitive: Any) -> GltfModel:
     doc.tree.setdefault("materials", []).append(material)
     doc.place(doc.quad(material=len(doc.tree["materials"]) - 1, **primitive))
     return doc
 
 
-def with_image(doc: Gltf, data: bytes, sampler: dict[str, int] | None = None) -> dict[str, Any]:
+def with_image(
+    doc: GltfModel, data: bytes, sampler: dict[str, int] | None = None
+) -> dict[str, Any]:
     doc.tree["images"] = [
         {"bufferView": doc.view(data), "mimeType": "image/png", "name": "Brick.1"}
     ]
@@ -45,7 +47,7 @@ def with_image(doc: Gltf, data: bytes, sampler: dict[str, int] | None = None) ->
 
 
 def test_a_quad(put: Put) -> None:
-    scene = ingest(put("a.glb", Gltf.wall().glb()))
+    scene = ingest(put("a.glb", GltfModel.wall().glb()))
     assert scene.objects == ("wall",)
     assert (scene.space.metres, scene.space.up) == (1.0, "y")
     assert (scene.space.unit_guessed, scene.space.up_guessed) == (False, False)
@@ -60,7 +62,7 @@ def test_a_quad(put: Put) -> None:
 
 @pytest.mark.parametrize("kind", ["embedded", "beside"])
 def test_gltf_with_buffers_of_its_own_or_beside_it(put: Put, kind: str) -> None:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     put("Büffer 1.bin", doc.blob)
     uri = "" if kind == "embedded" else "B%C3%BCffer%201.bin"
     scene = ingest(put("a.gltf", doc.gltf(uri)))
@@ -69,7 +71,7 @@ def test_gltf_with_buffers_of_its_own_or_beside_it(put: Put, kind: str) -> None:
 
 
 def test_nodes_move_turn_and_mirror(put: Put) -> None:
-    doc = Gltf.wall(scale=[-1, 1, 1], translation=[0, 0, 7])
+    doc = GltfModel.wall(scale=[-1, 1, 1], translation=[0, 0, 7])
     half = math.sqrt(0.5)
     doc.tree["nodes"] += [
         {"mesh": 0, "rotation": [0, half, 0, half]},
@@ -94,7 +96,7 @@ def test_materials(put: Put, side: bool) -> None:
         "alphaMode": "BLEND",
         "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.0, 1.0, 0.25]},
     }
-    scene = ingest(put("a.glb", with_material(Gltf(), material).glb()))
+    scene = ingest(put("a.glb", with_material(GltfModel(), material).glb()))
     (made,) = scene.materials
     assert made.name == "glass"
     assert made.color == pytest.approx((0.735357, 0.0, 1.0), abs=1e-6)
@@ -114,11 +116,11 @@ def test_materials(put: Put, side: bool) -> None:
     ],
 )
 def test_what_never_occludes(put: Put, more: dict[str, Any], transparent: bool) -> None:
-    scene = ingest(put("a.glb", with_material(Gltf(), more).glb()))
+    scene = ingest(put("a.glb", with_material(GltfModel(), more).glb()))
     assert [m.transparent for m in scene.materials] == [transparent]
 
 
-def with_modes(doc: Gltf, pixels: np.ndarray, *modes: str, coords: Any = None) -> Gltf:
+def with_modes(doc: GltfModel, pixels: np.ndarray, *modes: str, coords: Any = None) -> GltfModel:
     """Quads side by side that show one image, each in another mode."""
     base = with_image(doc, png(pixels))
     for place, mode in enumerate(modes):
@@ -139,7 +141,7 @@ def pixels_of(scene: Scene, material: int) -> np.ndarray:
 def test_an_opaque_material_ignores_the_alpha_of_its_texture(put: Put, bands: int) -> None:
     """glTF 2.0, section 3.9.6. Clients that know no modes see it opaque, too."""
     pixels = noise(1, bands=bands)
-    scene = ingest(put("a.glb", with_modes(Gltf(), pixels, "OPAQUE").glb()))
+    scene = ingest(put("a.glb", with_modes(GltfModel(), pixels, "OPAQUE").glb()))
     assert not scene.materials[0].transparent
     assert scene.opaque.all()
     assert np.array_equal(pixels_of(scene, 0), pixels[..., :-1].squeeze())
@@ -148,7 +150,7 @@ def test_an_opaque_material_ignores_the_alpha_of_its_texture(put: Put, bands: in
 
 def test_an_image_of_opaque_and_of_blended_materials_becomes_two(put: Put) -> None:
     pixels = noise(1, bands=4)
-    doc = with_modes(Gltf(), pixels, "OPAQUE", "BLEND", "OPAQUE", "MASK")
+    doc = with_modes(GltfModel(), pixels, "OPAQUE", "BLEND", "OPAQUE", "MASK")
     scene = ingest(put("a.glb", doc.glb()))
     assert [m.transparent for m in scene.materials] == [False, True, False, True]
     assert [m.image for m in scene.materials] == [0, 1, 0, 1]
@@ -161,7 +163,7 @@ def test_an_image_stays_one_where_opaque_materials_use_opaque_texels(put: Put) -
     pixels = noise(1, bands=4)
     pixels[4:, :, 3] = 255  # the lower half
     coords = [(0, 0.9), (1, 0.9), (1, 0.7), (0, 0.7)]
-    doc = with_modes(Gltf(), pixels, "OPAQUE", "BLEND", coords=coords)
+    doc = with_modes(GltfModel(), pixels, "OPAQUE", "BLEND", coords=coords)
     scene = ingest(put("a.glb", doc.glb()))
     assert [m.transparent for m in scene.materials] == [False, True]
     assert [m.image for m in scene.materials] == [0, 0]
@@ -169,7 +171,7 @@ def test_an_image_stays_one_where_opaque_materials_use_opaque_texels(put: Put) -
 
 
 def test_what_transmits_light_ignores_alpha_too(put: Put) -> None:
-    doc = with_modes(Gltf(), noise(1, bands=4), "OPAQUE")
+    doc = with_modes(GltfModel(), noise(1, bands=4), "OPAQUE")
     glass = {"KHR_materials_transmission": {"transmissionFactor": 1}}
     doc.tree["materials"][0]["extensions"] = glass
     scene = ingest(put("a.glb", doc.glb()))
@@ -187,7 +189,7 @@ def test_what_transmits_light_ignores_alpha_too(put: Put) -> None:
     ],
 )
 def test_wrapping(put: Put, sampler: Any, wraps: tuple[str, str], noted: bool) -> None:
-    doc = Gltf()
+    doc = GltfModel()
     material = with_image(doc, png(noise(1)), sampler)
     scene = ingest(put("a.glb", with_material(doc, material).glb()))
     assert (scene.materials[0].wrap_s, scene.materials[0].wrap_t) == wraps
@@ -195,7 +197,7 @@ def test_wrapping(put: Put, sampler: Any, wraps: tuple[str, str], noted: bool) -
 
 
 def test_the_bytes_of_images_are_kept(put: Put, tmp_path: Path) -> None:
-    doc, data = Gltf(), png(noise(1))
+    doc, data = GltfModel(), png(noise(1))
     material = with_image(doc, data)
     path = put("a.glb", with_material(doc, material).glb())
     (image,) = ingest(path).images
@@ -210,7 +212,7 @@ def test_the_bytes_of_images_are_kept(put: Put, tmp_path: Path) -> None:
 
 
 def test_images_as_files_and_data(put: Put) -> None:
-    doc = Gltf()
+    doc = GltfModel()
     material = with_image(doc, b"")
     doc.tree["images"] = [{"uri": "Tex%20one.png"}]
     data = png(noise(2))
@@ -233,7 +235,7 @@ def test_images_as_files_and_data(put: Put) -> None:
 
 def test_second_set_of_coordinates_normalised_and_transformed(put: Put) -> None:
     """All three are lost by trimesh alone."""
-    doc = Gltf()
+    doc = GltfModel()
     material = with_image(doc, png(noise(1)))
     use = material["pbrMetallicRoughness"]["baseColorTexture"]
     use["texCoord"] = 1
@@ -253,7 +255,7 @@ def test_second_set_of_coordinates_normalised_and_transformed(put: Put) -> None:
 
 
 def test_quantised_positions(put: Put) -> None:
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     steps = np.array([[0, 0, 0], [32767, 0, 0], [32767, 16384, 0], [-32768, 16384, 0]], np.int16)
     padded = np.zeros((4, 4), np.int16)
@@ -276,7 +278,7 @@ def test_quantised_positions(put: Put) -> None:
 
 
 def test_strips_and_no_indices(put: Put) -> None:
-    doc = Gltf()
+    doc = GltfModel()
     strip = doc.quad(mode=5)
     strip["indices"] = doc.add(np.array([0, 1, 3, 2], np.uint8))
     doc.place(strip)
@@ -298,7 +300,7 @@ def test_strips_and_no_indices(put: Put) -> None:
 
 
 def test_cameras_and_what_hangs_below_them(put: Put) -> None:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     doc.tree["cameras"] = [
         {"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}},
         {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}},
@@ -324,13 +326,13 @@ def test_cameras_and_what_hangs_below_them(put: Put) -> None:
 
 
 def test_space_may_be_given(put: Put) -> None:
-    scene = ingest(put("a.glb", Gltf.wall().glb()), IngestOptions(unit="cm", up="z"))
+    scene = ingest(put("a.glb", GltfModel.wall().glb()), IngestOptions(unit="cm", up="z"))
     assert np.ptp(scene.points, axis=0) == pytest.approx([0.1, 0, 0.04])
     assert (scene.space.metres, scene.space.up) == (0.01, "z")
 
 
 def test_a_size_that_is_unlikely_is_told(put: Put) -> None:
-    assert "PTM-N227" in codes(ingest(put("a.glb", Gltf.wall(scale=[100, 100, 100]).glb())))
+    assert "PTM-N227" in codes(ingest(put("a.glb", GltfModel.wall(scale=[100, 100, 100]).glb())))
 
 
 DAMAGED: dict[str, tuple[str, bytes]] = {
@@ -404,7 +406,7 @@ def test_damaged(put: Put, name: str) -> None:
 
 
 def test_buffers_that_are_missing_or_outside(put: Put, tmp_path: Path) -> None:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     put("out.bin", doc.blob)
     (tmp_path / "in").mkdir()
     with pytest.raises(InputError, match="PTM-I203"):
@@ -417,7 +419,7 @@ def test_buffers_that_are_missing_or_outside(put: Put, tmp_path: Path) -> None:
 
 def test_any_damaged_byte_gives_a_scene_or_one_line(put: Put) -> None:
     rng = np.random.default_rng(5)
-    doc = Gltf()
+    doc = GltfModel()
     material = with_image(doc, png(noise(1)))
     good = with_material(doc, material).glb()
     refused = 0

@@ -31,12 +31,12 @@ from ptmtools.scene import (
 )
 from ptmtools.scene.gltf import document as gltf_document
 from ptmtools.scene.images import ImageStore
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.obj import read_obj
 from ptmtools.scene.source import FileRange
 from tests.memory import little_memory
 
-from .conftest import FACE, QUAD, Gltf, Put, broken, noise, png
+from .conftest import FACE, QUAD, GltfModel, Put, broken, noise, png
 
 SECRET = png(noise(9))
 
@@ -146,7 +146,7 @@ ESCAPED = [
 @pytest.mark.parametrize("what", ["image", "buffer"])
 def test_gltf_does_not_lead_out(put: Put, house: Path, name: str, what: str) -> None:
     name = name.format(house.parent)
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(material=0))
     doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
     doc.tree["textures"] = [{"source": 0}]
@@ -174,7 +174,7 @@ def test_a_file_that_turns_into_a_pipe_is_not_waited_for(put: Put, tmp_path: Pat
 @pytest.mark.parametrize("letter", [chr(0xD800), chr(0xDFFF)])
 def test_halves_of_characters_in_names(put: Put, letter: str) -> None:
     """JSON may hold what no text file can: it must not come out at the other end."""
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(material=0), name=f"wall {letter}")
     doc.tree["materials"] = [{"name": f"paint {letter}", "extras": {letter: letter}}]
     scene = ingest(put("a.glb", doc.glb()))
@@ -239,9 +239,9 @@ def test_masks_are_kept_in_bits(textured: Callable[..., Path]) -> None:
     pixels = np.full((1024, 1023, 4), 255, np.uint8)
     pixels[700, 1000:, 3] = 0
     path = textured("map_Kd wall.png", {"wall.png": png(pixels)})
-    texture = read_obj(path, Findings(path)).materials[0].texture
+    texture = read_obj(path, IngestNotes(path), IngestOptions()).materials[0].texture
     assert texture is not None
-    store = ImageStore(Findings(path), 1 << 30)
+    store = ImageStore(IngestNotes(path), 1 << 30)
     decoded = store.add(texture)
     assert decoded is not None
     index, holes = decoded
@@ -272,7 +272,7 @@ def test_an_image_that_many_materials_name_is_read_once(
 
 
 def read(path: Path, max_triangles: int = 1 << 31) -> int:
-    source = read_obj(path, Findings(path), max_triangles=max_triangles)
+    source = read_obj(path, IngestNotes(path), IngestOptions(max_triangles=max_triangles))
     return len(source.triangles)
 
 
@@ -365,9 +365,9 @@ def test_indices_out_of_range(put: Put, face: str) -> None:
         read(put("a.obj", QUAD + face + "\n"))
 
 
-def placed(count: int) -> Gltf:
+def placed(count: int) -> GltfModel:
     """One mesh at so many nodes."""
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     doc.tree["nodes"] = [{"mesh": 0}] * count
     doc.tree["scenes"] = [{"nodes": list(range(count))}]
     return doc
@@ -378,7 +378,7 @@ def test_instances_are_counted_before_they_are_made(put: Put) -> None:
     with pytest.raises(LimitError, match="PTM-L203"):
         ingest(put("a.glb", placed(6).glb()), IngestOptions(max_triangles=10))
     # Vertices that are shared are read for each.
-    doc = Gltf()
+    doc = GltfModel()
     quads = [doc.quad() for _ in range(9)]
     for quad in quads:
         quad["attributes"] = quads[0]["attributes"]
@@ -391,7 +391,7 @@ def test_instances_are_counted_before_they_are_made(put: Put) -> None:
     with pytest.raises(LimitError, match=r"more than 530 vertices.*PTM-L203"):
         ingest(put("a.glb", doc.glb()), IngestOptions(max_triangles=53))
     # A strip has nearly as many triangles as corners.
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(mode=5))
     with pytest.raises(LimitError, match="PTM-L203"):
         ingest(put("a.glb", doc.glb()), IngestOptions(max_triangles=5))
@@ -410,7 +410,7 @@ def test_a_chain_of_nodes(put: Put) -> None:
 
 
 def test_a_buffer_that_many_name_is_read_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     put("a.bin", doc.blob + bytes(1000))
     tree = json.loads(doc.gltf("a.bin"))
     (entry,) = tree["buffers"]
@@ -443,7 +443,7 @@ def test_a_buffer_that_many_name_is_read_once(put: Put, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("length", [2**31, 2**40, 2**62, 2**70])
 def test_a_buffer_that_declares_more_than_its_file_has(put: Put, length: int) -> None:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     put("a.bin", doc.blob)
     tree = json.loads(doc.gltf("a.bin"))
     tree["buffers"][0]["byteLength"] = length

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from tests.scene.conftest import FACE, QUAD, Gltf, Put, noise, png
+from tests.scene.conftest import FACE, QUAD, GltfModel, Put, noise, png
 
 
 def info(path: Path, capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -89,7 +89,7 @@ def test_a_hole_in_the_roof_is_noticed(put: Put, capsys: pytest.CaptureFixture[s
 
 
 def test_of_a_gltf_model(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["asset"]["generator"] = "a test"
     doc.tree["extensionsUsed"] = ["KHR_materials_unlit", "MSFT_lod", "KHR_materials_ior"]
     doc.tree["images"] = [{"bufferView": doc.view(png(noise(1))), "mimeType": "image/png"}]

@@ -16,7 +16,7 @@ from ptmtools.scene.lighting import _placed
 from ptmtools.scene.lights import MOST, Lamp, Lights
 from ptmtools.scene.model import Space
 from ptmtools.texture.images.png import png_bytes
-from tests.scene.conftest import Gltf, Put, png
+from tests.scene.conftest import GltfModel, Put, png
 
 GREEN = 0.7152
 
@@ -33,14 +33,14 @@ def noted(scene: Scene) -> set[tuple[str, str]]:
 
 
 def scene_with_lamp(put: Put, light: Any, **node: Any) -> Scene:
-    def change(doc: Gltf) -> None:
+    def change(doc: GltfModel) -> None:
         doc.tree["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
         use = {"KHR_lights_punctual": {"light": 0}}
         doc.tree["nodes"].append({"extensions": use, **node})
         doc.tree["nodes"].append({"children": [1], "translation": [1, 2, 3]})
         doc.tree["scenes"][0]["nodes"] = [0, 2]
 
-    return ingest(put("lamp.glb", Gltf.wall(change).glb()), IngestOptions(strict=True))
+    return ingest(put("lamp.glb", GltfModel.wall(change).glb()), IngestOptions(strict=True))
 
 
 def with_lamp(put: Put, light: dict[str, Any], **node: Any) -> Lights:
@@ -88,7 +88,7 @@ def test_lamps_that_are_none(put: Put, light: Any, node: dict[str, Any]) -> None
 
 def test_a_lamp_that_the_model_does_not_define(put: Put) -> None:
     use = {"KHR_lights_punctual": {"light": 0}}
-    scene = ingest(put("lamp.glb", Gltf.wall(extensions=use).glb()))
+    scene = ingest(put("lamp.glb", GltfModel.wall(extensions=use).glb()))
     assert not scene.lights
     assert ("PTM-N215", "node 0") in noted(scene)
 
@@ -121,7 +121,7 @@ def emitting(
     uv: np.ndarray | None = None,
     **material: Any,
 ) -> Scene:
-    def change(doc: Gltf) -> None:
+    def change(doc: GltfModel) -> None:
         doc.tree["images"] = [{"bufferView": doc.view(image), "mimeType": "image/png"}]
         doc.tree["textures"] = [{"source": 0}]
         doc.tree["materials"] = [material]
@@ -130,7 +130,7 @@ def emitting(
         if uv is not None:
             primitive["attributes"]["TEXCOORD_1"] = doc.add(uv.astype(np.float32))
 
-    return ingest(put("glow.glb", Gltf.wall(change).glb()), options)
+    return ingest(put("glow.glb", GltfModel.wall(change).glb()), options)
 
 
 def test_emission_of_gltf(put: Put) -> None:
@@ -188,7 +188,7 @@ def test_an_image_without_effect_is_a_note(put: Put, image: bytes, limit: int) -
 
 
 def test_missing_images_of_lights_are_no_misses(put: Put, textured: Callable[..., Path]) -> None:
-    def change(doc: Gltf) -> None:
+    def change(doc: GltfModel) -> None:
         doc.tree["images"] = [{"uri": "gone.png"}]
         doc.tree["textures"] = [{"source": 0}]
         use = {"index": 0}
@@ -196,7 +196,7 @@ def test_missing_images_of_lights_are_no_misses(put: Put, textured: Callable[...
         doc.tree["materials"] = [material]
         doc.tree["meshes"][0]["primitives"][0]["material"] = 0
 
-    scene = ingest(put("gone.gltf", Gltf.wall(change).gltf()), IngestOptions(strict=True))
+    scene = ingest(put("gone.gltf", GltfModel.wall(change).gltf()), IngestOptions(strict=True))
     assert lights(scene).glow.tolist() == pytest.approx([1])
     assert ("PTM-N204", "material 0") in noted(scene)
     model = textured("Ke 1 1 1\nmap_Ke broken.png", {"broken.png": b"none"})
@@ -228,7 +228,7 @@ def test_images_are_decoded_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(lighting, "_mean", counted)
 
-    def change(doc: Gltf) -> None:
+    def change(doc: GltfModel) -> None:
         image = {"bufferView": doc.view(png(HALF)), "mimeType": "image/png"}
         doc.tree["images"] = [image, {**image, "bufferView": doc.view(png(HALF))}]
         doc.tree["textures"] = [{"source": 0}, {"source": 1}]
@@ -241,7 +241,7 @@ def test_images_are_decoded_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> N
             doc.place(doc.quad(material=number), translation=[0, 0, -1 - number])
         doc.tree["meshes"][0]["primitives"][0]["material"] = 0
 
-    own = lights(ingest(put("shared.glb", Gltf.wall(change).glb())))
+    own = lights(ingest(put("shared.glb", GltfModel.wall(change).glb())))
     assert own.glow.tolist() == pytest.approx([0.5] * 4)
     assert len(uses) == 1
     assert own.map.tolist() == [0, 0, 0, 1]
@@ -299,7 +299,7 @@ def test_a_lightmap_of_surfaces_without_coordinates(put: Put) -> None:
 def test_lightmaps_on_mirrored_nodes_and_instances(put: Put) -> None:
     """Each face has its own coordinates: u grows to the right in the mesh."""
 
-    def change(doc: Gltf) -> None:
+    def change(doc: GltfModel) -> None:
         doc.tree["images"] = [{"bufferView": doc.view(png(HALF)), "mimeType": "image/png"}]
         doc.tree["textures"] = [{"source": 0}]
         doc.tree["materials"] = [{"occlusionTexture": {"index": 0}}]
@@ -314,7 +314,7 @@ def test_lightmaps_on_mirrored_nodes_and_instances(put: Put) -> None:
         doc.tree["nodes"].pop(0)
         doc.tree["scenes"] = [{"nodes": [0, 1, 2]}]
 
-    scene = ingest(put("mirrored.glb", Gltf.wall(change).glb()))
+    scene = ingest(put("mirrored.glb", GltfModel.wall(change).glb()))
     own = lights(scene)
     assert len(scene.triangles) == 8
     middle = scene.corners[..., 0] - (scene.points[:, 0].min() + scene.points[:, 0].max()) / 2
@@ -322,13 +322,13 @@ def test_lightmaps_on_mirrored_nodes_and_instances(put: Put) -> None:
 
 
 def test_a_lightmap_that_is_missing(put: Put) -> None:
-    def change(doc: Gltf) -> None:
+    def change(doc: GltfModel) -> None:
         doc.tree["images"] = [{"uri": "gone.png"}]
         doc.tree["textures"] = [{"source": 0}]
         doc.tree["materials"] = [{"occlusionTexture": {"index": 0}}, 5]
         doc.tree["meshes"][0]["primitives"][0]["material"] = 0
 
-    model = put("gone.gltf", Gltf.wall(change).gltf())
+    model = put("gone.gltf", GltfModel.wall(change).gltf())
     scene = ingest(model)
     assert not scene.lights
     assert "gone.png" in scene.files

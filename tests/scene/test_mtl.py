@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.scene.mtl import MapStatement, parse_map, read_mtl
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 
 finite = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: round(x, 4))
 word = st.text(st.sampled_from("abcXYZ0123456789_ü()."), min_size=1, max_size=8)
@@ -114,17 +114,17 @@ def test_tint_and_opacity(
     put: Callable[..., Path], lines: str, color: tuple[float, ...] | None, dissolve: float
 ) -> None:
     path = put("a.mtl", "# made by hand\n\nnewmtl m\n" + lines + "\n")
-    findings = Findings(path)
+    findings = IngestNotes(path)
     material = read_mtl(path, findings)["m"]
     assert (material.color, material.dissolve) == (color, dissolve)
-    assert findings.notes == ()
+    assert findings.entries == ()
 
 
 def test_lines_not_understood_and_names_defined_twice(put: Callable[..., Path]) -> None:
     path = put("a.mtl", "newmtl m\r\nKd red\r\nd\r\nmap_Kd -s\r\nnewmtl m\r\nKd 1 1 1\r\n")
-    findings = Findings(path)
+    findings = IngestNotes(path)
     assert read_mtl(path, findings)["m"].color is None
-    printed = [(n.code, n.place) for n in findings.notes]
+    printed = [(n.code, n.place) for n in findings.entries]
     assert printed == [
         ("PTM-N214", "a.mtl:2"),
         ("PTM-N214", "a.mtl:3"),

@@ -10,21 +10,22 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.errors import InputError
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.obj import read_obj
-from ptmtools.scene.source import Source
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.source import ModelSource
 
 from .conftest import QUAD
 
 
-def read(path: Path) -> Source:
-    return read_obj(path, Findings(path))
+def read(path: Path) -> ModelSource:
+    return read_obj(path, IngestNotes(path), IngestOptions())
 
 
 def codes(path: Path) -> dict[str, int]:
-    findings = Findings(path)
-    read_obj(path, findings)
-    return {note.code: note.count for note in findings.notes}
+    findings = IngestNotes(path)
+    read_obj(path, findings, IngestOptions())
+    return {note.code: note.count for note in findings.entries}
 
 
 @pytest.mark.parametrize(
@@ -101,9 +102,9 @@ def test_several_libraries_and_names_with_blanks(
 
 def test_what_is_skipped_is_counted(put: Callable[..., Path]) -> None:
     path = put("a.obj", QUAD + "vn 0 0 1\ns off\nl 1 2\nl 2 3\nblah 1\nf 1 2\nf 1 2 3\n")
-    findings = Findings(path)
-    read_obj(path, findings)
-    printed = {(n.code, n.place): n.count for n in findings.notes}
+    findings = IngestNotes(path)
+    read_obj(path, findings, IngestOptions())
+    printed = {(n.code, n.place): n.count for n in findings.entries}
     assert printed == {
         ("PTM-N215", "a.obj:11"): 2,
         ("PTM-N215", "a.obj:13"): 1,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ptmtools.scene.reference import Folder
+from ptmtools.scene.reference import ModelFolder
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def model(put: Callable[..., Path], tmp_path: Path) -> Path:
     ],
 )
 def test_found_where_the_model_says(model: Path, name: str, file: str) -> None:
-    actual = Folder(model).find(name)
+    actual = ModelFolder(model).find(name)
     assert actual.outcome == "found"
     assert actual.path is not None
     assert actual.path.resolve() == model / file
@@ -56,7 +56,7 @@ def test_found_where_the_model_says(model: Path, name: str, file: str) -> None:
 )
 def test_found_by_the_end_of_the_name(model: Path, name: str) -> None:
     (model / "Wall 1.png").write_bytes(b"at the top")
-    actual = Folder(model).find(name)
+    actual = ModelFolder(model).find(name)
     assert actual.outcome == "elsewhere"
     expected = "Wall 1.png" if "share" in name else "textures/Wall 1.png"
     assert actual.path is not None
@@ -65,25 +65,25 @@ def test_found_by_the_end_of_the_name(model: Path, name: str) -> None:
 
 def test_beside_the_library_before_the_root(model: Path) -> None:
     (model / "near.png").write_bytes(b"far")
-    actual = Folder(model).find("near.png", model / "mtl")
+    actual = ModelFolder(model).find("near.png", model / "mtl")
     assert actual.path == model / "mtl" / "near.png"
-    assert Folder(model).find("Tür.png", model / "mtl").path == model / "Tür.png"
+    assert ModelFolder(model).find("Tür.png", model / "mtl").path == model / "Tür.png"
 
 
 def test_a_backslash_may_be_a_letter(model: Path) -> None:
     (model / "textures\\odd.png").write_bytes(b"unpacked badly")
-    assert Folder(model).find("textures\\odd.png").path == model / "textures\\odd.png"
+    assert ModelFolder(model).find("textures\\odd.png").path == model / "textures\\odd.png"
 
 
 @pytest.mark.parametrize("name", ["../secret.png", "textures/../../secret.png", "link.png", "{}"])
 def test_outside_is_refused_unless_asked_for(model: Path, tmp_path: Path, name: str) -> None:
     os.symlink(tmp_path / "secret.png", model / "link.png")
     name = name.format(tmp_path / "secret.png")
-    folder = Folder(model)
+    folder = ModelFolder(model)
     refused = folder.find(name)
     assert (refused.outcome, refused.path) == ("outside", None)
     assert not folder.sought
-    allowed = Folder(model, allow_outside=True).find(name)
+    allowed = ModelFolder(model, allow_outside=True).find(name)
     assert allowed.path is not None
     assert allowed.path.read_bytes() == b"secret"
 
@@ -92,11 +92,11 @@ def test_outside_is_refused_unless_asked_for(model: Path, tmp_path: Path, name: 
     "name", ["no.png", "", "/", "textures", "a\0b.png", "x" * 5000, "http://a/b"]
 )
 def test_missing(model: Path, name: str) -> None:
-    assert Folder(model).find(name).outcome == "missing"
+    assert ModelFolder(model).find(name).outcome == "missing"
 
 
 def test_what_was_sought_is_listed_in_order(model: Path) -> None:
-    folder = Folder(model)
+    folder = ModelFolder(model)
     for name in ("TEXTURES\\Wall 1.png", "no.png", "../no.png", "Tür.png", "no.png"):
         folder.find(name)
     assert list(folder.sought) == ["textures/Wall 1.png", "no.png", "Tür.png"]

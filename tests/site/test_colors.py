@@ -25,7 +25,7 @@ from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.pictures import Kind, pictures_of
 from tests.output.agreement import kinds
-from tests.scene.conftest import Gltf, png
+from tests.scene.conftest import GltfModel, png
 
 from .conftest import build
 
@@ -51,7 +51,7 @@ def color_at(point: np.ndarray) -> np.ndarray:
 def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The room's walls white with colours of their own, the panel and leaves with an alpha that is
     tested, and the pane blended. The finest levels of the leaves are in a preview."""
-    doc = Gltf()
+    doc = GltfModel()
     tested = {"alphaMode": "MASK", "alphaCutoff": CUTOFF, "doubleSided": True}
     doc.tree["images"] = [
         {"bufferView": doc.view(png(np.full((8, 8, 3), 255, np.uint8))), "mimeType": "image/png"},
@@ -113,7 +113,7 @@ def halves() -> np.ndarray:
 
 
 def primitive(
-    doc: Gltf, corners: np.ndarray, material: int, light: np.ndarray | None = None
+    doc: GltfModel, corners: np.ndarray, material: int, light: np.ndarray | None = None
 ) -> dict[str, Any]:
     attributes = {
         "POSITION": doc.add(corners.astype(np.float32)),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ptmtools.site.content import Site, site_of
-from tests.scene.conftest import Gltf, noise, png
+from tests.scene.conftest import GltfModel, noise, png
 
 from .conftest import PLAIN, build
 from .previews import (
@@ -37,7 +37,7 @@ COUNT = 9
 @pytest.fixture(scope="module")
 def room(tmp_path_factory: pytest.TempPathFactory) -> Site:
     """A room with nine textures: on each wall one, and three panels across."""
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["images"] = [
         {"bufferView": doc.view(png(noise(k))), "mimeType": "image/png"} for k in range(COUNT)
     ]
@@ -66,7 +66,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Site:
     return site
 
 
-def _primitive(doc: Gltf, corners: Any, material: int) -> dict[str, Any]:
+def _primitive(doc: GltfModel, corners: Any, material: int) -> dict[str, Any]:
     coords = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
     return {
         "attributes": {
@@ -370,7 +370,7 @@ def test_long_names_of_previews_differ(tmp_path: Path) -> None:
     shades = np.add.outer(np.arange(256), np.arange(256)) // 2
     image = np.repeat(shades[..., None], 3, axis=2).astype(np.uint8) + noise(3, 256) // 16
     name = "painting" * 8
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["images"] = [
         {"bufferView": doc.view(png(image)), "mimeType": "image/png", "name": name}
     ]

@@ -26,8 +26,9 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.glb import BINARY, COMPONENTS, ITEMS, MAGIC, elements, glb_chunks, meaning, natural
 from ptmtools.meshopt.decoding import EXTENSIONS, decode as decode_view
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.reference import Folder
+from ptmtools.scene.formats import FileFacts
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.reference import ModelFolder
 from ptmtools.scene.source import FileRange, HeldBytes, decode
 
 #: A surrogate in JSON; a single one is not valid text.
@@ -52,7 +53,7 @@ class Buffer:
         return FileRange(self.path, self.offset + start, length)
 
 
-class Document:
+class GltfDocument:
     """A glTF model: its file, the parsed JSON and its buffers in order, None for those without
     bytes."""
 
@@ -176,7 +177,7 @@ def damaged(path: Path, reason: str, place: str | None = None) -> InputError:
     )
 
 
-def open_document(path: Path, folder: Folder) -> Document:
+def open_document(path: Path, folder: ModelFolder) -> GltfDocument:
     """Reads a .glb or .gltf file and all its buffers.
 
     Raises InputError if the container is damaged or a buffer is missing.
@@ -185,7 +186,7 @@ def open_document(path: Path, folder: Folder) -> Document:
     version = str(tree["asset"].get("version", ""))
     if not version.startswith("2."):
         raise damaged(path, f"version {version!r}")
-    return Document(path, tree, _buffers(path, tree, folder, binary))
+    return GltfDocument(path, tree, _buffers(path, tree, folder, binary))
 
 
 def document_json(path: Path) -> dict[str, Any]:
@@ -229,7 +230,7 @@ def _reject_constant(name: str) -> float:
 
 
 def _buffers(
-    path: Path, tree: dict[str, Any], folder: Folder, binary: Buffer | None
+    path: Path, tree: dict[str, Any], folder: ModelFolder, binary: Buffer | None
 ) -> list[Buffer | None]:
     """The buffers of a document, in order; None for placeholders of compressed data."""
     entries: list[Buffer | Path | None] = []
@@ -261,7 +262,7 @@ def _buffers(
     return buffers
 
 
-def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:
+def _external(path: Path, folder: ModelFolder, uri: str, place: str) -> Path:
     """The file of a buffer. Raises InputError PTM-I203, PTM-I205."""
     result = folder.find(unquote(uri))
     if result.path is None:
@@ -318,12 +319,16 @@ _WORDS: dict[Support, str] = {
 _ANY = "open it in Blender and export it as glTF again"
 
 
-def support_of(name: str) -> str:
-    """The support of an extension in words."""
-    return _WORDS[KNOWN.get(name, "noted")]
+def facts_of(model: Path) -> FileFacts:
+    """The facts in the JSON of a model. Raises as `document_json`."""
+    tree = document_json(model)
+    asset = tree["asset"]
+    names = tree.get("extensionsUsed", []) + tree.get("extensionsRequired", [])
+    support = {name: _WORDS[KNOWN.get(name, "noted")] for name in sorted({*map(str, names)})}
+    return FileFacts(str(asset.get("version", "")), str(asset.get("generator", "")), support)
 
 
-def check_extensions(tree: dict[str, object], findings: Findings) -> None:
+def check_extensions(tree: dict[str, object], notes: IngestNotes) -> None:
     """Notes dropped extensions. Raises InputError PTM-I243 for an unsupported required one."""
     required, used = tree.get("extensionsRequired", []), tree.get("extensionsUsed", [])
     if not isinstance(required, list) or not isinstance(used, list):
@@ -332,9 +337,9 @@ def check_extensions(tree: dict[str, object], findings: Findings) -> None:
         raise InputError(
             "PTM-I243",
             f"requires the unsupported glTF extension {name}",
-            file=findings.model,
+            file=notes.model,
             remedy=_REMEDIES.get(name, _ANY),
         )
     for name in sorted({str(name) for name in used}):
         if KNOWN.get(name, "noted") == "noted":
-            findings.note("PTM-N215", f"{name} dropped")
+            notes.note("PTM-N215", f"{name} dropped")

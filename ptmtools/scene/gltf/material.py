@@ -19,23 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.scene.colors import luminance, to_srgb
-from ptmtools.scene.gltf.document import FAULTS, Document, data_uri, fault_of
-from ptmtools.scene.ktx2 import TranscodedBytes
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.gltf.compression import TranscodedBytes
+from ptmtools.scene.gltf.document import FAULTS, GltfDocument, data_uri, fault_of
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import (
     FileRange,
     HeldBytes,
     NormalTexture,
     SourceMaterial,
+    SourceTexture,
     SourceWrap,
-    Texture,
 )
 
 #: Maps the JSON of a material to that of one of its textures.
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
 T = TypeVar("T")
 #: A texture, and as `_placing`.
-_Placed: TypeAlias = "tuple[Texture | None, str, NDArray[np.float64], bool]"
+_Placed: TypeAlias = "tuple[SourceTexture | None, str, NDArray[np.float64], bool]"
 
 _UNLIT = "KHR_materials_unlit"
 _KTX2 = "image/ktx2"
@@ -48,7 +48,7 @@ class MaterialUse:
 
     Attributes
     ----------
-    index: into `MaterialReader.materials`.
+    index: into `GltfMaterialReader.materials`.
     coords: the attribute with its texture coordinates.
     matrix: (2, 3) KHR_texture_transform, origin at the upper left as in glTF.
     see_through: whether its alpha mode is not opaque.
@@ -67,7 +67,7 @@ class MaterialUse:
     optional: bool = False
 
 
-class MaterialReader:
+class GltfMaterialReader:
     """Reads each material once, on first use.
 
     ``texture_of`` selects the texture of a material; the default is that of the base colour. With
@@ -77,14 +77,14 @@ class MaterialReader:
 
     def __init__(
         self,
-        document: Document,
-        findings: Findings,
+        document: GltfDocument,
+        notes: IngestNotes,
         texture_of: TextureOf | None = None,
         *,
         normals: bool = True,
     ) -> None:
         self._document = document
-        self._findings = findings
+        self._notes = notes
         self._texture_of = texture_of
         self._normals = normals and texture_of is None
         self._uses: dict[tuple[int | None, bool], MaterialUse] = {}
@@ -116,7 +116,7 @@ class MaterialReader:
             use = glossy.get("diffuseTexture")
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
-            self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
+            self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         mode = entry.get("alphaMode", "OPAQUE")
@@ -125,7 +125,7 @@ class MaterialReader:
         opacity = {"BLEND": a, "MASK": float(a >= cutoff)}.get(mode, 1.0)
         see_through = mode in ("MASK", "BLEND")
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
-            self._findings.note("PTM-N215", f"{name}: transmits light, never occludes", place)
+            self._notes.note("PTM-N215", f"{name}: transmits light, never occludes", place)
             see_through = True
 
         placed: _Placed = None, "TEXCOORD_0", np.eye(2, 3), False
@@ -138,7 +138,7 @@ class MaterialReader:
         texture, coords, matrix, moved = placed
         if moved:
             message = f"{name}: KHR_texture_transform baked into its faces"
-            self._findings.note("PTM-N215", message, place)
+            self._notes.note("PTM-N215", message, place)
         normal, normal_coords, normal_matrix = None, None, None
         relief = glow = None
         if self._normals and "normalTexture" in entry:
@@ -192,7 +192,7 @@ class MaterialReader:
         try:
             return read(entry, place)
         except FAULTS as fault:
-            self._findings.note(code, f"{what} left out: {fault_of(fault)}", place)
+            self._notes.note(code, f"{what} left out: {fault_of(fault)}", place)
             return None
 
     def _placed(self, use: dict[str, Any], place: str) -> _Placed:
@@ -208,7 +208,7 @@ class MaterialReader:
 
     def _normal(
         self, entry: dict[str, Any], place: str
-    ) -> tuple[Texture, float, str, NDArray[np.float64]] | None:
+    ) -> tuple[SourceTexture, float, str, NDArray[np.float64]] | None:
         """The image of a normal map, its scale, and as `_placing`."""
         use = entry["normalTexture"]
         scale = _finite(use.get("scale", 1.0))
@@ -224,11 +224,11 @@ class MaterialReader:
         stronger = extensions.get("KHR_materials_emissive_strength", {})
         strength = finite(stronger.get("emissiveStrength", 1.0))
         use = entry.get("emissiveTexture")
-        with self._findings.optional():
+        with self._notes.optional():
             image = None if use is None else self._texture(use["index"], place, 1.0)
         return {"glow": strength * float(luminance(np.array(factor))), "glow_map": image}
 
-    def _texture(self, index: int, place: str, strength: float) -> Texture | None:
+    def _texture(self, index: int, place: str, strength: float) -> SourceTexture | None:
         tree = self._document.tree
         texture = tree["textures"][index]
         sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
@@ -237,7 +237,7 @@ class MaterialReader:
         source = next((each["source"] for each in sources if "source" in each), None)
         what = f"texture {index}"
         if source is None:
-            self._findings.miss("PTM-N204", f"{what}: has no image", place)
+            self._notes.miss("PTM-N204", f"{what}: has no image", place)
             return None
         image = tree["images"][source]
         uri = image.get("uri")
@@ -249,12 +249,12 @@ class MaterialReader:
             read = HeldBytes(data_uri(self._document.path, uri, f"image {source}"))
         else:
             what = unquote(str(uri))
-            file = self._findings.locate(what, what, place)
+            file = self._notes.locate(what, what, place)
             if file is None:
                 return None
             read, label = FileRange(file), file.name
         packed = image.get("mimeType") == _KTX2 or label.lower().endswith(".ktx2")
-        return Texture(
+        return SourceTexture(
             read=TranscodedBytes(read) if packed else read,
             label=label,
             what=what,

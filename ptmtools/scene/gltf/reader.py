@@ -1,7 +1,4 @@
-"""Reads the nodes and primitives of glTF 2.0 models (.glb and .gltf) into a `Source`.
-
-Covers sections 3.5.3 (transformations), 3.7.2 (meshes) and 3.10 (cameras), KHR_node_visibility,
-KHR_lights_punctual and EXT_mesh_gpu_instancing. The unit is the metre and Y is up by specification.
+"""Reads the primitives of glTF 2.0 models (section 3.7.2) into a `ModelSource`.
 
 trimesh (5.2) is not used because it reads only TEXCOORD_0, leaves normalised integers unscaled,
 drops the mesh and children of a camera's node, keeps neither wrap modes nor the bytes of images,
@@ -11,7 +8,6 @@ and takes a time that grows with the third power of the graph's depth (six minut
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,186 +19,24 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.glb import COMPONENTS, meaning, natural
-from ptmtools.scene.colors import encoded, luminance
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.colors import encoded
+from ptmtools.scene.formats import MAX_VERTICES, Purpose, too_many_triangles
+from ptmtools.scene.gltf.compression import DRACO, DracoMesh, decode_primitives
 from ptmtools.scene.gltf.document import (
     FAULTS,
-    Document,
+    GltfDocument,
     check_extensions,
     damaged,
+    document_json,
     fault_of,
     open_document,
 )
-from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
-from ptmtools.scene.gltf.material import MaterialReader, MaterialUse, TextureOf, finite
-from ptmtools.scene.lights import MOST, Lamp, LampKind
-from ptmtools.scene.model import Camera
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import MAX_VERTICES, Rows, Source, too_many_triangles
-
-_INSTANCING, _LIGHTS = "EXT_mesh_gpu_instancing", "KHR_lights_punctual"
-_DEFAULTS = {
-    "TRANSLATION": (0.0, 0.0, 0.0),
-    "ROTATION": (0.0, 0.0, 0.0, 1.0),
-    "SCALE": (1.0, 1.0, 1.0),
-}
-
-
-def world_matrices(tree: dict[str, Any], findings: Findings) -> dict[int, Floats]:
-    """(4, 4) local to world of each visible node of the default scene, else of the first one,
-    parents first. Raises ValueError for a node with two parents."""
-    nodes = tree.get("nodes", [])
-    scenes = tree.get("scenes", [])
-    if scenes:
-        roots = scenes[tree.get("scene", 0)].get("nodes", [])
-    else:
-        children = {child for node in nodes for child in node.get("children", [])}
-        roots = [i for i in range(len(nodes)) if i not in children]
-    world: dict[int, Floats] = {}
-    stack = [(root, np.eye(4)) for root in reversed(roots)]
-    while stack:
-        node, parent = stack.pop()
-        if natural(node) in world:
-            raise ValueError(f"node {node} has two parents")
-        entry = nodes[node]
-        visibility = entry.get("extensions", {}).get("KHR_node_visibility", {})
-        if visibility.get("visible", True) is False:
-            findings.note("PTM-N215", "invisible, dropped with its children", f"node {node}")
-            continue
-        with np.errstate(all="ignore"):
-            world[node] = parent @ _local_matrix(entry)
-        stack += [(child, world[node]) for child in reversed(entry.get("children", []))]
-    return world
-
-
-def _local_matrix(entry: dict[str, Any]) -> Floats:
-    """(4, 4) of a node: its matrix, or scale, then rotation, then translation."""
-    if "matrix" in entry:
-        return np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T
-    parts = (
-        np.array(entry.get(name.lower(), default), dtype=np.float64).reshape(1, len(default))
-        for name, default in _DEFAULTS.items()
-    )
-    return np.asarray(_matrices(*parts)[0])
-
-
-def _matrices(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
-    """(n, 4, 4) of (n, 3) translations, (n, 4) quaternions x, y, z, w, and (n, 3) scales."""
-    x, y, z, w = rotation.T
-    norm = (rotation**2).sum(axis=1)
-    s = np.divide(2, norm, out=np.zeros_like(norm), where=norm > 0)
-    turn = np.array(
-        [
-            [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-            [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-            [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
-        ]
-    )
-    local = np.tile(np.eye(4), (len(rotation), 1, 1))
-    local[:, :3, :3] = np.moveaxis(turn, 2, 0) * scale[:, None]
-    local[:, :3, 3] = translation
-    return local
-
-
-def instance_count(document: Document, node: int) -> int:
-    """The number of instances of a node's mesh. Raises ValueError if its attributes disagree."""
-    attributes = _instance_attributes(document, node)
-    if attributes is None:
-        return 1
-    accessors = document.tree["accessors"]
-    counts = {natural(accessors[natural(accessor)]["count"]) for accessor in attributes.values()}
-    if len(counts) != 1:
-        raise ValueError(f"node {node}: attributes of instances differ in length")
-    count = counts.pop()
-    if not count:
-        raise ValueError(f"node {node}: no instances")
-    return count
-
-
-def instances(document: Document, node: int) -> Floats:
-    """(n, 4, 4) from the mesh of a node to the node, for each instance."""
-    attributes = _instance_attributes(document, node)
-    if attributes is None:
-        return np.eye(4)[None]
-    count = instance_count(document, node)
-    parts = []
-    for name, default in _DEFAULTS.items():
-        if name not in attributes:
-            parts.append(np.tile(np.array(default), (count, 1)))
-            continue
-        parts.append(document.values(attributes[name]))
-        if parts[-1].shape[1] != len(default):
-            raise ValueError(f"node {node}: {name} of {parts[-1].shape[1]} numbers")
-    return _matrices(*parts)
-
-
-def _instance_attributes(document: Document, node: int) -> dict[str, int] | None:
-    extensions = document.tree["nodes"][node].get("extensions", {})
-    attributes: dict[str, int] | None = extensions.get(_INSTANCING, {}).get("attributes")
-    return attributes or None
-
-
-def cameras(
-    tree: dict[str, Any], world: dict[int, Floats], findings: Findings
-) -> tuple[Camera, ...]:
-    """The perspective cameras of the nodes."""
-    result: list[Camera] = []
-    for node, matrix in world.items():
-        entry = tree["nodes"][node]
-        if "camera" not in entry:
-            continue
-        definition = tree["cameras"][entry["camera"]]
-        name = str(entry.get("name") or definition.get("name") or f"camera {len(result)}")
-        yfov = definition.get("perspective", {}).get("yfov", 0.0)
-        result += findings.camera(name, f"node {node}", matrix[:3, 3], -matrix[:3, 2], yfov)
-    return tuple(result)
-
-
-#: By the names of KHR_lights_punctual.
-_KINDS: dict[str, LampKind] = {"point": "point", "spot": "spot", "directional": "sun"}
-
-
-def lamps(tree: dict[str, Any], world: dict[int, Floats], findings: Findings) -> tuple[Lamp, ...]:
-    """The lamps of the nodes (KHR_lights_punctual). One that is damaged is left out, with a
-    note."""
-    result = []
-    for node, matrix in world.items():
-        use = tree["nodes"][node].get("extensions", {}).get(_LIGHTS)
-        if use is None:
-            continue
-        try:
-            lamp = _lamp(tree["extensions"][_LIGHTS]["lights"][natural(use["light"])], matrix)
-        except FAULTS as fault:
-            findings.note("PTM-N215", f"lamp left out: {fault_of(fault)}", f"node {node}")
-            continue
-        if lamp.intensity > MOST:
-            findings.note("PTM-N215", f"intensity of a lamp reduced to {MOST:g}", f"node {node}")
-            lamp = replace(lamp, intensity=MOST)
-        if lamp.intensity:
-            result.append(lamp)
-    return tuple(result)
-
-
-def _lamp(entry: dict[str, Any], matrix: Floats) -> Lamp:
-    """The lamp of a node, which shines along its -Z. Its range is a hint, and has no effect. Raises
-    one of `FAULTS`."""
-    kind = _KINDS[entry["type"]]
-    color = np.array([finite(part) for part in entry.get("color", [1.0, 1.0, 1.0])])
-    intensity = finite(entry.get("intensity", 1.0)) * float(luminance(color))
-    if not (np.abs(matrix[:3, 3]) <= MOST).all():
-        raise ValueError(f"more than {MOST:g} m away")
-    x, y, z = matrix[:3, 3].tolist()
-    if kind == "point":
-        return Lamp(kind, (x, y, z), intensity=intensity)
-    with np.errstate(all="ignore"):
-        way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-    if not np.isfinite(way).all():
-        raise ValueError("no direction")
-    angles = entry.get("spot", {})
-    outer = min(finite(angles.get("outerConeAngle", math.pi / 4)), math.pi / 2)
-    inner = min(finite(angles.get("innerConeAngle", 0.0)), outer)
-    dx, dy, dz = way.tolist()
-    return Lamp(kind, (x, y, z), (dx, dy, dz), intensity, (math.cos(inner), math.cos(outer)))
-
+from ptmtools.scene.gltf.material import GltfMaterialReader, MaterialUse, TextureOf
+from ptmtools.scene.gltf.nodes import cameras, instance_count, instances, lamps, world_matrices
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.source import MeshArrays, ModelSource, SecondReading
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 #: Largest number of vertices per allowed triangle.
@@ -232,35 +66,63 @@ class _Draw:
 
 def read_gltf(
     path: Path,
-    findings: Findings,
-    max_triangles: int = MAX_VERTICES,
+    notes: IngestNotes,
+    options: IngestOptions,
+    progress: Progress = silent,
     texture_of: TextureOf | None = None,
-    *,
-    normals: bool = True,
-) -> Source:
-    """Reads a glTF model; ``texture_of`` and ``normals`` as in `MaterialReader`.
+) -> ModelSource:
+    """Reads a glTF model; ``texture_of`` as in `GltfMaterialReader`.
 
     Raises InputError if it is damaged or requires an unsupported extension; LimitError, before
     arrays are allocated, for more vertices than int32 can number (PTM-L203) or more triangles than
-    ``max_triangles`` (PTM-L203), instances included, and for too much decompressed data (PTM-L204).
+    ``options`` allow (PTM-L203), instances included, and for too much decompressed data (PTM-L204).
     """
     try:
-        document = open_document(path, findings.folder)
-        materials = MaterialReader(document, findings, texture_of, normals=normals)
-        return _read(document, findings, max_triangles, materials)
+        document = open_document(path, notes.folder)
+        normals = options.normal_maps == "draw"
+        materials = GltfMaterialReader(document, notes, texture_of, normals=normals)
+        return _read(document, notes, options.max_triangles, materials)
     except InputError:
         raise
     except FAULTS as error:
         raise damaged(path, fault_of(error)) from None
 
 
+#: The textures of a second reading.
+_OTHER_TEXTURES: dict[Purpose, TextureOf] = {
+    "lightmap": lambda entry: entry.get("occlusionTexture"),
+    "reflection": lambda entry: entry.get("pbrMetallicRoughness", {}).get(
+        "metallicRoughnessTexture"
+    ),
+}
+
+
+def read_again(path: Path, options: IngestOptions, purpose: Purpose) -> SecondReading | None:
+    """A glTF with other textures; None if no material has such a texture. Raises as `read_gltf`."""
+    texture_of = _OTHER_TEXTURES[purpose]
+    materials = document_json(path).get("materials", [])
+    if not any(texture_of(entry) for entry in materials if type(entry) is dict):
+        return None
+    asked: list[bool] = []
+
+    def ask(entry: dict[str, Any]) -> dict[str, Any] | None:
+        use = texture_of(entry)
+        asked.append(use is not None)
+        return use
+
+    notes = IngestNotes(path, options.allow_outside)
+    source = read_gltf(path, notes, options, texture_of=ask)
+    missing = tuple(note for note in notes.entries if note.code in ("PTM-N204", "PTM-N205"))
+    return SecondReading(source, tuple(asked), missing, tuple(notes.folder.sought))
+
+
 def _read(
-    document: Document, findings: Findings, max_triangles: int, materials: MaterialReader
-) -> Source:
+    document: GltfDocument, notes: IngestNotes, max_triangles: int, materials: GltfMaterialReader
+) -> ModelSource:
     path, tree = document.path, document.tree
-    check_extensions(tree, findings)
-    world_of = world_matrices(tree, findings)
-    every = (draw for node in world_of for draw in _draws(document, node, findings))
+    check_extensions(tree, notes)
+    world_of = world_matrices(tree, notes)
+    every = (draw for node in world_of for draw in _draws(document, node, notes))
     draws = list(_limited(document, every, max_triangles))
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with triangles")
@@ -270,12 +132,12 @@ def _read(
     ]
     compressed = [_compressed(document, draw) for draw in draws]
     decoded = decode_primitives(document, (c["bufferView"] for c in compressed if c is not None))
-    rows, first, step = Rows(), dict[int, int](), 0.0
+    arrays, first, step = MeshArrays(), dict[int, int](), 0.0
     grids: dict[tuple[bool, int], float] = {}
     for draw, use, draco in zip(draws, uses, compressed, strict=True):
         try:
             values = _Values(document, draw, draco, decoded)
-            points, triangles, uv, colors = _mesh(values, draw, use, findings)
+            points, triangles, uv, colors = _mesh(values, draw, use, notes)
             normal_uv = None
             if use.normal_coords is not None and use.normal_matrix is not None:
                 count = len(points)
@@ -290,24 +152,30 @@ def _read(
         except ValueError as error:
             raise damaged(path, str(error), draw.place) from None
         if draw.node not in first:
-            first[draw.node] = len(rows.names)
-            rows.names += [draw.name] * draw.instances
+            first[draw.node] = arrays.add_objects(draw.name, draw.instances)
         with np.errstate(all="ignore"):
             frames = world_of[draw.node] @ placed
             scale = np.linalg.norm(frames[:, :3, :3], axis=1)
             step = max(step, grid * float(scale[np.isfinite(scale)].max(initial=0.0)))
-        rows.add(frames, points, triangles, uv, use.index, colors, first[draw.node], normal_uv)
-    return rows.source(
+        arrays.add(
+            first[draw.node],
+            points,
+            triangles,
+            frames=frames,
+            uv=uv,
+            material=use.index,
+            colors=colors,
+            normal_uv=normal_uv,
+        )
+    return arrays.source(
         materials=materials.materials,
-        cameras=cameras(tree, world_of, findings),
-        lamps=lamps(tree, world_of, findings),
-        metres=1.0,
-        up="y",
+        cameras=cameras(tree, world_of, notes),
+        lamps=lamps(tree, world_of, notes),
         step=step,
     )
 
 
-def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]:
+def _draws(document: GltfDocument, node: int, notes: IngestNotes) -> Iterator[_Draw]:
     """The primitives of a node."""
     tree = document.tree
     entry = tree["nodes"][node]
@@ -316,20 +184,20 @@ def _draws(document: Document, node: int, findings: Findings) -> Iterator[_Draw]
     mesh = tree["meshes"][entry["mesh"]]
     name = str(entry.get("name") or mesh.get("name") or f"node {node}")
     if "skin" in entry:
-        findings.note("PTM-N215", "skin drawn in its rest pose", f"node {node}")
+        notes.note("PTM-N215", "skin drawn in its rest pose", f"node {node}")
     count = instance_count(document, node)
     for k, primitive in enumerate(mesh["primitives"]):
         place = f"mesh {entry['mesh']}, primitive {k}"
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN):
-            findings.note("PTM-N215", f"primitive of mode {mode} (points or lines), skipped", place)
+            notes.note("PTM-N215", f"primitive of mode {mode} (points or lines), skipped", place)
             continue
         if primitive.get("targets"):
-            findings.note("PTM-N215", "morph targets dropped", place)
+            notes.note("PTM-N215", "morph targets dropped", place)
         yield _Draw(node, name, primitive, place, count)
 
 
-def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> Iterator[_Draw]:
+def _limited(document: GltfDocument, draws: Iterable[_Draw], max_triangles: int) -> Iterator[_Draw]:
     """The same primitives with their counts of triangles. Raises LimitError PTM-L203."""
     most = min(MAX_VERTICES, _VERTICES_PER_TRIANGLE * max_triangles)
     vertices = triangles = 0
@@ -355,7 +223,7 @@ def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> 
         yield replace(draw, triangles=each)
 
 
-def _compressed(document: Document, draw: _Draw) -> dict[str, Any] | None:
+def _compressed(document: GltfDocument, draw: _Draw) -> dict[str, Any] | None:
     """The Draco extension of a primitive, unless it also has uncompressed data."""
     draco: dict[str, Any] | None = draw.primitive.get("extensions", {}).get(DRACO)
     plain = "bufferView" in document.tree["accessors"][draw.attributes["POSITION"]]
@@ -367,10 +235,10 @@ class _Values:
 
     def __init__(
         self,
-        document: Document,
+        document: GltfDocument,
         draw: _Draw,
         draco: dict[str, Any] | None,
-        decoded: dict[int, Decoded],
+        decoded: dict[int, DracoMesh],
     ) -> None:
         self._document, self._draw = document, draw
         self._ids = {} if draco is None else draco["attributes"]
@@ -428,7 +296,7 @@ class _Values:
 
 
 def _mesh(
-    values: _Values, draw: _Draw, use: MaterialUse, findings: Findings
+    values: _Values, draw: _Draw, use: MaterialUse, notes: IngestNotes
 ) -> tuple[Floats, Ints, Floats, NDArray[np.uint8] | None]:
     """The arrays of a primitive: (n, 3) points and (m, 3) triangles over them; (m, 3, 2) texture
     coordinates from the lower left and (m, 3, 3) colours of corners, if it has any."""
@@ -444,7 +312,7 @@ def _mesh(
     if raw is not None:
         colors = encoded(raw[:, :3] * use.light)[triangles]
         if use.see_through and not (raw[:, 3:] == 1).all():
-            findings.note("PTM-N215", "opacities of vertices dropped", draw.place)
+            notes.note("PTM-N215", "opacities of vertices dropped", draw.place)
     return points, triangles, uv[triangles], colors
 
 

@@ -30,13 +30,14 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
+from ptmtools.scene.formats import too_many_triangles
 from ptmtools.scene.ifc.entities import FAULTS, has_body, items, name_of, one_line, title_of
 from ptmtools.scene.ifc.spaces import named_rooms, rooms_of
 from ptmtools.scene.messages import pack_source
 from ptmtools.scene.model import Kind, RoomVolume, Storey
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.sandbox import reply_so_far, serve, unreadable
-from ptmtools.scene.source import Rows, Source, SourceMaterial, too_many_triangles
+from ptmtools.scene.source import MeshArrays, ModelSource, SourceMaterial
 
 _PLAIN, _DIRECT = "opencascade", "passthrough"
 _THREADS = 1
@@ -93,7 +94,7 @@ _LOGGED = re.compile(
 
 
 @dataclass(frozen=True)
-class Shape:
+class ProductShape:
     """The triangles of a product."""
 
     product: Any
@@ -105,10 +106,10 @@ class Shape:
 
 def read_products(
     file: Any,
-    findings: Findings,
+    notes: IngestNotes,
     max_triangles: int,
-    before_rooms: Callable[[Source, int], None] = lambda source, spaces: None,
-) -> Source:
+    before_rooms: Callable[[ModelSource, int], None] = lambda source, spaces: None,
+) -> ModelSource:
     """The source of an IfcOpenShell file. ``before_rooms`` is called with the source without rooms
     and the number of spaces, if there are any, before the kernel computes their volumes.
 
@@ -116,13 +117,13 @@ def read_products(
     """
     unit, metres = length_unit(file)
     if metres is None:
-        findings.note("PTM-N201", "the file defines no unit of length")
+        notes.note("PTM-N201", "the file defines no unit of length")
     elif metres != 1:
-        findings.note("PTM-N201", f"lengths in {unit} ({metres:g} m) converted to metres")
-    products = _drawn_products(file, findings)
-    shapes = _shapes(file, products, max_triangles, findings.model) if products else []
-    _note_products(products, shapes, findings)
-    note_dropped(file, findings)
+        notes.note("PTM-N201", f"lengths in {unit} ({metres:g} m) converted to metres")
+    products = _drawn_products(file, notes)
+    shapes = _shapes(file, products, max_triangles, notes.model) if products else []
+    _note_products(products, shapes, notes)
+    note_dropped(file, notes)
     if not shapes:
         raise InputError(
             "PTM-I247",
@@ -130,34 +131,25 @@ def read_products(
             remedy="export it with the geometry of its building elements",
         )
     numbers: dict[SourceMaterial, int] = {}
-    rows = Rows()
+    arrays = MeshArrays()
     for shape in shapes:
         material = np.array([numbers.setdefault(m, len(numbers)) for m in shape.materials])
-        uv = np.zeros((len(shape.triangles), 3, 2))
-        rows.add(
-            np.eye(4)[None],
-            shape.points,
-            shape.triangles,
-            uv,
-            material[shape.material],
-            None,
-            len(rows.names),
-        )
-        rows.names.append(title_of(shape.product))
-    source = rows.source(
+        number = arrays.add_objects(title_of(shape.product))
+        arrays.add(number, shape.points, shape.triangles, material=material[shape.material])
+    source = arrays.source(
         materials=tuple(numbers),
         metres=None if metres is None else 1.0,
         up="z",
         kinds=tuple(_kind(shape.product) for shape in shapes),
         storeys=storeys(file, metres or 1.0),
     )
-    if spaces := rooms_of(file, findings):
+    if spaces := rooms_of(file, notes):
         before_rooms(source, len(spaces))
-        source = replace(source, rooms=_rooms(file, spaces, findings))
+        source = replace(source, rooms=_rooms(file, spaces, notes))
     return source
 
 
-def _rooms(file: Any, spaces: list[Any], findings: Findings) -> tuple[RoomVolume, ...]:
+def _rooms(file: Any, spaces: list[Any], notes: IngestNotes) -> tuple[RoomVolume, ...]:
     """The rooms of spaces; the kernel may fail without harm to the model."""
     meshes: dict[int, tuple[Floats, Ints]] = {}
     ranks: dict[int, tuple[bool, str]] = {}
@@ -170,7 +162,7 @@ def _rooms(file: Any, spaces: list[Any], findings: Findings) -> tuple[RoomVolume
                 meshes[element.id] = shape.points, shape.triangles
     for _ in _errors():  # of spaces, which `named_rooms` notes
         pass
-    return named_rooms(spaces, meshes, findings)
+    return named_rooms(spaces, meshes, notes)
 
 
 def _kind(product: Any) -> Kind:
@@ -180,7 +172,7 @@ def _kind(product: Any) -> Kind:
     return kind_of(product.is_a)
 
 
-def _drawn_products(file: Any, findings: Findings) -> list[Any]:
+def _drawn_products(file: Any, notes: IngestNotes) -> list[Any]:
     """The products to draw; notes the others with geometry."""
     result, hidden = [], Counter[str]()
     for product in sorted(file.by_type("IfcProduct"), key=lambda product: int(product.id())):
@@ -189,17 +181,17 @@ def _drawn_products(file: Any, findings: Findings) -> list[Any]:
         if not drawn(product.is_a):
             hidden[product.is_a()] += 1
         elif not has_body(product):
-            findings.note("PTM-N215", f"{product.is_a()}: lines without a surface")
+            notes.note("PTM-N215", f"{product.is_a()}: lines without a surface")
         else:
             result.append(product)
     for name, count in hidden.items():
-        findings.note("PTM-N215", f"{name}: not drawn", "", count)
+        notes.note("PTM-N215", f"{name}: not drawn", "", count)
     return result
 
 
-def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
+def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[ProductShape]:
     """The preferred shape of each product that has any, in the order of their numbers."""
-    best: dict[int, tuple[tuple[bool, str], Shape]] = {}
+    best: dict[int, tuple[tuple[bool, str], ProductShape]] = {}
     count = 0
     for element in elements(file, products):
         shape = _shape(file, element)
@@ -230,7 +222,7 @@ def _padded(name: str) -> str:
     return f"{number:>12}-{rest}"
 
 
-def _shape(file: Any, element: Any) -> Shape:
+def _shape(file: Any, element: Any) -> ProductShape:
     """A copy of a shape of the kernel, which overwrites it with the next one."""
     geometry = element.geometry
     placed = np.array(element.transformation.matrix, dtype=np.float64).reshape(4, 4).T
@@ -241,7 +233,7 @@ def _shape(file: Any, element: Any) -> Shape:
     materials = UNSTYLED, *(material_of(file, one) for one in geometry.materials)
     if shines(product):
         materials = tuple(replace(material, glow=GLOW) for material in materials)
-    return Shape(
+    return ProductShape(
         product,
         local @ placed[:3, :3].T + placed[:3, 3],
         triangles.astype(np.int64),
@@ -250,7 +242,7 @@ def _shape(file: Any, element: Any) -> Shape:
     )
 
 
-def _note_products(products: list[Any], shapes: list[Shape], findings: Findings) -> None:
+def _note_products(products: list[Any], shapes: list[ProductShape], notes: IngestNotes) -> None:
     """Misses products without a shape, or with an incomplete one."""
     shaped = {shape.product.id() for shape in shapes}
     errors: dict[str, str] = {}
@@ -261,10 +253,10 @@ def _note_products(products: list[Any], shapes: list[Shape], findings: Findings)
         reason = f" ({errors[guid]})" if guid in errors else ""
         if product.id() not in shaped:
             message = f"{title_of(product)}: geometry cannot be computed{reason}"
-            findings.miss("PTM-N253", message, f"GlobalId {guid}")
+            notes.miss("PTM-N253", message, f"GlobalId {guid}")
         elif reason:
             message = f"{title_of(product)}: a part of the geometry cannot be computed{reason}"
-            findings.miss("PTM-N253", message, f"GlobalId {guid}")
+            notes.miss("PTM-N253", message, f"GlobalId {guid}")
 
 
 def _errors() -> Iterator[tuple[str, str]]:
@@ -417,7 +409,7 @@ def material_of(file: Any, style: Any) -> SourceMaterial:
     return SourceMaterial(name or _shade(color), color, opacity)
 
 
-def note_dropped(file: Any, findings: Findings) -> None:
+def note_dropped(file: Any, notes: IngestNotes) -> None:
     """Notes the unsupported properties of surfaces."""
     for name, message in _DROPPED:
         try:
@@ -425,7 +417,7 @@ def note_dropped(file: Any, findings: Findings) -> None:
         except RuntimeError:  # not a class of this schema
             continue
         if count:
-            findings.note("PTM-N215", message, "", count)
+            notes.note("PTM-N215", message, "", count)
 
 
 def _shade(color: tuple[float, float, float] | None) -> str:
@@ -433,7 +425,7 @@ def _shade(color: tuple[float, float, float] | None) -> str:
     return "#" + "".join(f"{round(255 * part):02x}" for part in color) if color else UNSTYLED.name
 
 
-def _open(path: str, findings: Findings) -> Any:
+def _open(path: str, notes: IngestNotes) -> Any:
     """Raises InputError PTM-I243 for an unknown schema, PTM-I254 for other errors."""
     import ifcopenshell as library
 
@@ -445,24 +437,24 @@ def _open(path: str, findings: Findings) -> Any:
         ) from None
     except library.Error as error:
         errors = [text for _, text in _errors()]
-        raise unreadable("ifcopenshell", findings.model, one_line([*errors, error][0])) from None
+        raise unreadable("ifcopenshell", notes.model, one_line([*errors, error][0])) from None
     if errors := [text for _, text in _errors()]:
         message = f"invalid statements skipped, the first: {errors[0]}"
-        findings.miss("PTM-N244", message, "", len(errors))
+        notes.miss("PTM-N244", message, "", len(errors))
     return file
 
 
 def _read_in_child(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
-    findings = Findings(Path(model))
+    notes = IngestNotes(Path(model))
 
-    def reply_without_rooms(source: Source, spaces: int) -> None:
-        without = Findings(Path(model))
-        without.add_records(findings.records())
+    def reply_without_rooms(source: ModelSource, spaces: int) -> None:
+        without = IngestNotes(Path(model))
+        without.add_records(notes.records())
         without.note("PTM-N215", "IfcSpace: no room (IfcOpenShell fails on them)", "", spaces)
         reply_so_far(pack_source(source, {}, without, scratch))
 
-    source = read_products(_open(path, findings), findings, int(most), reply_without_rooms)
-    return pack_source(source, {}, findings, scratch)
+    source = read_products(_open(path, notes), notes, int(most), reply_without_rooms)
+    return pack_source(source, {}, notes, scratch)
 
 
 if __name__ == "__main__":

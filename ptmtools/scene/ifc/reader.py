@@ -16,10 +16,11 @@ from typing import IO
 
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_regular
+from ptmtools.progress import Progress, silent
 from ptmtools.scene.messages import read_in_sandbox
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.sandbox import require
-from ptmtools.scene.source import MAX_VERTICES, Source
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.source import ModelSource
 
 #: The start and the end of a file of ISO 10303-21.
 _START = re.compile(rb"(\xef\xbb\xbf)?\s*ISO-10303-21\s*;")
@@ -39,32 +40,55 @@ _DAMAGED = (
 )
 
 
-def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
-    """Reads an IFC file, or the one in a `.ifczip`.
+def read_ifc(
+    path: Path, notes: IngestNotes, options: IngestOptions, progress: Progress = silent
+) -> ModelSource:
+    """Reads an IFC file.
 
     Points are in metres, Z up, in the coordinate system of the file; openings are cut out.
 
     Raises
     ------
-    InputError: PTM-I266 not a STEP file, a truncated one, or an archive without exactly one,
-        PTM-I243 an unknown schema, PTM-I247 nothing to draw, and PTM-I254 if IfcOpenShell cannot
-        read the file.
-    LimitError: PTM-L203 more than ``max_triangles``, PTM-L204 an archive that unpacks to more than
-        1 GiB.
-    MissingComponentError: PTM-M100 IfcOpenShell is not installed.
+    InputError: PTM-I266 not a STEP file, or a truncated one, PTM-I243 an unknown schema, PTM-I247
+        nothing to draw, and PTM-I254 if IfcOpenShell cannot read the file.
+    LimitError: PTM-L203 more triangles than ``options`` allow.
     """
     with naming(path), tempfile.TemporaryDirectory() as scratch:
-        file = path.absolute()
-        if path.suffix.lower() == ".ifczip":
-            file = _unpacked(path, Path(scratch))
-        _check(file)
-        require("ifcopenshell", "IFC requires ifcopenshell", "pip install 'ptmtools[ifc]'", path)
-        arguments = str(file), str(max_triangles)
-        module = "ptmtools.scene.ifc.products"
-        other_bytes = 0 if file == path.absolute() else file.stat().st_size
-        return read_in_sandbox(
-            module, "ifcopenshell", path, findings, scratch, *arguments, other_bytes=other_bytes
-        )
+        return _read(path, path.absolute(), notes, options, scratch)
+
+
+def read_ifczip(
+    path: Path, notes: IngestNotes, options: IngestOptions, progress: Progress = silent
+) -> ModelSource:
+    """Reads the IFC file in an archive. Raises as `read_ifc`, InputError PTM-I266 for an archive
+    without exactly one, and LimitError PTM-L204 for one that unpacks to more than 1 GiB."""
+    with naming(path), tempfile.TemporaryDirectory() as scratch:
+        file = _unpack(path, Path(scratch))
+        other_bytes = file.stat().st_size
+        return _read(path, file, notes, options, scratch, other_bytes=other_bytes)
+
+
+def _read(
+    path: Path,
+    file: Path,
+    notes: IngestNotes,
+    options: IngestOptions,
+    scratch: str,
+    *,
+    other_bytes: int = 0,
+) -> ModelSource:
+    """The products of ``file``, which is the model or its unpacked content."""
+    _check(file)
+    return read_in_sandbox(
+        "ptmtools.scene.ifc.products",
+        "ifcopenshell",
+        path,
+        notes,
+        scratch,
+        str(file),
+        str(options.max_triangles),
+        other_bytes=other_bytes,
+    )
 
 
 def _check(file: Path) -> None:
@@ -86,7 +110,7 @@ def _check(file: Path) -> None:
             )
 
 
-def _unpacked(path: Path, folder: Path) -> Path:
+def _unpack(path: Path, folder: Path) -> Path:
     """Unpacks the file of an archive into a folder."""
     try:
         with open_regular(path) as stream, zipfile.ZipFile(stream) as archive:

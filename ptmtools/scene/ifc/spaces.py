@@ -18,7 +18,7 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.scene.ifc.entities import FAULTS, has_body, name_of, one_line
 from ptmtools.scene.model import RoomVolume
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 
 _SPACE = "IfcSpace"
 #: A space of this composition contains others, one of the next is a part of another.
@@ -30,7 +30,7 @@ _NO_MESH: tuple[Floats, Ints] = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int6
 _MOST_TRIANGLES = 20_000
 
 
-def rooms_of(file: Any, findings: Findings) -> list[Any]:
+def rooms_of(file: Any, notes: IngestNotes) -> list[Any]:
     """The spaces that may be rooms, in the order of their numbers; notes the others."""
     result, left = [], Counter[str]()
     for space in sorted(file.by_type(_SPACE), key=lambda space: int(space.id())):
@@ -43,7 +43,7 @@ def rooms_of(file: Any, findings: Findings) -> list[Any]:
         left[fault] += 1
     for fault, count in left.items():
         if fault:
-            findings.note("PTM-N215", f"{_SPACE}: no room ({fault})", "", count)
+            notes.note("PTM-N215", f"{_SPACE}: no room ({fault})", "", count)
     return result
 
 
@@ -71,7 +71,7 @@ def _parts(space: Any) -> list[Any]:
 
 
 def named_rooms(
-    spaces: Sequence[Any], meshes: Mapping[int, tuple[Floats, Ints]], findings: Findings
+    spaces: Sequence[Any], meshes: Mapping[int, tuple[Floats, Ints]], notes: IngestNotes
 ) -> tuple[RoomVolume, ...]:
     """The rooms of spaces; ``meshes`` are their points and triangles by number. Notes the spaces
     without a mesh."""
@@ -81,9 +81,9 @@ def named_rooms(
         points, triangles = meshes.get(space.id(), _NO_MESH)
         name, number = _long_name(space), name_of(space)
         if not len(triangles) or not np.isfinite(points).all():
-            findings.note("PTM-N215", f"{_SPACE}: no room (its volume cannot be computed)")
+            notes.note("PTM-N215", f"{_SPACE}: no room (its volume cannot be computed)")
         elif len(triangles) > _MOST_TRIANGLES:
-            findings.note("PTM-N215", f"{_SPACE}: no room (more than {_MOST_TRIANGLES} triangles)")
+            notes.note("PTM-N215", f"{_SPACE}: no room (more than {_MOST_TRIANGLES} triangles)")
         else:
             if (long_names[name] > 1 and number not in name) or not name:
                 name = one_line(f"{name} {number}")

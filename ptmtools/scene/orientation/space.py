@@ -16,8 +16,8 @@ such as statues, terrains and caves, have no rooms to judge by; they are never r
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene.model import Space
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.orientation.standing import HEIGHT
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.orientation.room_sizes import HEIGHT
 from ptmtools.scene.orientation.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
@@ -34,8 +34,8 @@ from ptmtools.scene.orientation.up_axis import (
     DOUBT_AXIS,
     TRUST,
     UNITS,
-    USUAL_UP,
     Candidate,
+    Evidence,
     NamedFaces,
     Up,
     candidates,
@@ -70,22 +70,28 @@ def parse_unit(unit: str | float) -> float:
 
 @dataclass(frozen=True)
 class DeclaredSpace:
-    """A declaration of a model's space by the user or the format: metres in one unit, up axis, and
-    whether the format prescribes the unit for all files instead of recording it in this one."""
+    """A declaration of a model's space by the user or the format.
+
+    Attributes
+    ----------
+    metres, up: the length of one unit and the up axis, if they are declared.
+    prescribed: the format prescribes the unit for all files instead of recording it in this one.
+    usual_up: the up axis by convention, which counts only where none is declared.
+    """
 
     metres: float | None = None
     up: Up | None = None
     prescribed: bool = False
+    usual_up: Up | None = None
 
 
 def settle(
-    model: Path,
     points: Floats,
     triangles: NDArray[np.integer],
     named: NamedFaces,
     by_user: DeclaredSpace,
     by_format: DeclaredSpace,
-    findings: Findings,
+    notes: IngestNotes,
     *,
     ask: bool = True,
 ) -> Space:
@@ -99,40 +105,18 @@ def settle(
     with np.errstate(over="ignore"):
         side = points.max(axis=0) - low
     if not np.isfinite(side).all():
-        raise LimitError("PTM-L204", "coordinates are too large for float64", file=model)
-    metres, up = by_user.metres or by_format.metres, by_user.up or by_format.up
+        raise LimitError("PTM-L204", "coordinates are too large for float64", file=notes.model)
     if by_user.metres is None or by_user.up is None:
         measured = evidence(points, triangles, named)
-        usual = None if by_format.up else USUAL_UP.get(model.suffix.lower())
-        # With numbers, so that a model in none of the units does not seem to lie on its side.
-        numbers = metres is None and all(each.standing.heights for each in measured.values())
-        ranked = candidates(measured, metres, usual, numbers=numbers)
-        judged = by_user.up or _judge_axis(ranked, by_format.up, findings)
-        up = up or judged
-        if by_user.metres is None:
-            every = candidates(measured, usual=usual, numbers=True)
-            ranked = [candidate for candidate in every if candidate.up == up]
-            if by_format.metres is None:
-                metres = _guess_unit(ranked, findings, ask)
-            else:
-                given = candidates(measured, by_format.metres, usual)
-                likely = next(c for c in every if c.up == judged and c.unit in UNITS)
-                metres = _judge_unit(
-                    next(candidate for candidate in given if candidate.up == up),
-                    likely,
-                    ranked,
-                    by_format.prescribed,
-                    findings,
-                    ask,
-                )
-    assert metres
-    assert up
+        metres, up = _judge(measured, by_user, by_format, notes, ask=ask)
+    else:
+        metres, up = by_user.metres, by_user.up
     extent = float(side.max()) * metres
     if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
         raise LimitError(
             "PTM-L204",
             f"the extent of the scene would be {extent:.3g} m",
-            file=model,
+            file=notes.model,
             remedy=f"use a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",
         )
     origin = low + side / 2
@@ -148,7 +132,36 @@ def settle(
     )
 
 
-def _judge_axis(ranked: list[Candidate], by_format: Up | None, findings: Findings) -> Up:
+def _judge(
+    measured: Mapping[Up, Evidence],
+    by_user: DeclaredSpace,
+    by_format: DeclaredSpace,
+    notes: IngestNotes,
+    *,
+    ask: bool,
+) -> tuple[float, Up]:
+    """Unit and up axis of a model of which the user has declared one at the most; notes guesses
+    and doubts. Raises InputError PTM-I236."""
+    metres = by_user.metres or by_format.metres
+    usual = None if by_format.up else by_format.usual_up
+    # With numbers, so that a model in none of the units does not seem to lie on its side.
+    numbers = metres is None and all(side.rooms.heights for side in measured.values())
+    ranked = candidates(measured, metres, usual, numbers=numbers)
+    judged = by_user.up or _judge_axis(ranked, by_format.up, notes)
+    up = by_user.up or by_format.up or judged
+    if by_user.metres is not None:
+        return by_user.metres, up
+    every = candidates(measured, usual=usual, numbers=True)
+    ranked = [candidate for candidate in every if candidate.up == up]
+    if by_format.metres is None:
+        return _guess_unit(ranked, notes, ask), up
+    given = candidates(measured, by_format.metres, usual)
+    likely = next(c for c in every if c.up == judged and c.unit in UNITS)
+    stated = next(candidate for candidate in given if candidate.up == up)
+    return _judge_unit(stated, likely, ranked, by_format.prescribed, notes, ask), up
+
+
+def _judge_axis(ranked: list[Candidate], by_format: Up | None, notes: IngestNotes) -> Up:
     """The most likely up axis, or that of the format, with a note on it."""
     best = ranked[0]
     rival = next(candidate for candidate in ranked if candidate.up != best.up)
@@ -160,34 +173,34 @@ def _judge_axis(ranked: list[Candidate], by_format: Up | None, findings: Finding
         if best.up == by_format or lead < DOUBT_AXIS or best.flat:
             return by_format
         if lead < CLOSE_AXIS:
-            findings.note(
+            notes.note(
                 "PTM-N232",
                 f"the up axis is uncertain: the format prescribes {by_format.upper()}, "
                 f"{rival.size}{for_rival}, but {best.up.upper()} is more likely, "
                 f"{best.size}{for_best}; use --up {by_format} or --up {best.up}",
             )
         else:
-            findings.note(
+            notes.note(
                 "PTM-N234",
                 f"the format prescribes {by_format.upper()} as the up axis, but the model seems "
                 f"to lie on its side: with {by_format.upper()} up it is {rival.size}, with "
                 f"{best.up.upper()} up {best.size}{for_best}; use --up {best.up} to rotate it",
             )
     elif lead < CLOSE_AXIS:
-        findings.note(
+        notes.note(
             "PTM-N232",
             f"the up axis is uncertain: assuming {best.up.upper()}, {best.size}{for_best}, but "
             f"{rival.up.upper()} is nearly as likely, {rival.size}{for_rival}; use --up {best.up} "
             f"or --up {rival.up}",
         )
     else:
-        findings.note(
+        notes.note(
             "PTM-N202",
             f"up axis guessed: {best.up.upper()}, {best.size}{for_best}; use --up to override",
         )
         if rival.rivals(best):
             unit = f", unit {rival.unit}" if rival.unit != best.unit else ""
-            findings.note(
+            notes.note(
                 "PTM-N238",
                 f"second-best guess: {rival.up.upper()} as the up axis{unit}, "
                 f"{rival.size}{for_rival}; use --up {rival.up} to select it",
@@ -200,28 +213,26 @@ def _reasons(candidate: Candidate, other: Candidate) -> str:
     return f" (reasons: {', '.join(reasons)})" if reasons else ""
 
 
-def _guess_unit(ranked: list[Candidate], findings: Findings, ask: bool) -> float:
+def _guess_unit(ranked: list[Candidate], notes: IngestNotes, ask: bool) -> float:
     """Metres in the most likely unit with a name, with a note on it; the user is asked if it is
     impossible."""
     best, rival = [candidate for candidate in ranked if candidate.unit in UNITS][:2]
     if best.too_low:
-        _ask("the unit cannot be guessed", best, ranked, findings, ask)
+        _ask("the unit cannot be guessed", best, ranked, notes, ask)
     elif best.small:
-        findings.note(
+        notes.note(
             "PTM-N233",
             f"the unit is uncertain: assuming {best.unit}, the model is lower than a visitor "
             f"{HEIGHT:g} m tall ({best.size}); use --unit to override",
         )
     elif rival.cost - best.cost < CLOSE_UNIT:
-        findings.note(
+        notes.note(
             "PTM-N233",
             f"the unit is uncertain: assuming {best.unit} ({best.size}), but {rival.unit} is "
             f"nearly as likely ({rival.size}); use --unit {best.unit} or --unit {rival.unit}",
         )
     else:
-        findings.note(
-            "PTM-N201", f"unit guessed: {best.unit} ({best.size}); use --unit to override"
-        )
+        notes.note("PTM-N201", f"unit guessed: {best.unit} ({best.size}); use --unit to override")
     return best.metres
 
 
@@ -230,7 +241,7 @@ def _judge_unit(
     likely: Candidate,
     ranked: list[Candidate],
     prescribed: bool,
-    findings: Findings,
+    notes: IngestNotes,
     ask: bool,
 ) -> float:
     """Metres in the given unit of the format, with a note if it is doubtful; the user is asked if
@@ -238,16 +249,16 @@ def _judge_unit(
     unit = "metres" if given.metres == 1 else f"units of {given.metres:g} m"
     too_high = given.too_high and given.cost - ranked[0].cost > TRUST
     if prescribed and (given.too_low or too_high):
-        _ask(f"the format is in {unit}, but the model can hardly be", given, ranked, findings, ask)
+        _ask(f"the format is in {unit}, but the model can hardly be", given, ranked, notes, ask)
     elif given.too_low:
-        findings.note(
+        notes.note(
             "PTM-N227",
             f"the file is in {unit} ({given.size}), but its rooms are too small for a visitor "
             f"{HEIGHT:g} m tall; use --unit to override",
         )
     # Units without a name are not among the candidates.
     elif given.unit in UNITS and likely.metres != given.metres:
-        findings.note(
+        notes.note(
             "PTM-N227",
             f"the format is in {unit}, but {likely.unit} is more likely ({likely.size}); use "
             "--unit to override",
@@ -256,7 +267,7 @@ def _judge_unit(
 
 
 def _ask(
-    message: str, doubted: Candidate, ranked: list[Candidate], findings: Findings, ask: bool
+    message: str, doubted: Candidate, ranked: list[Candidate], notes: IngestNotes, ask: bool
 ) -> None:
     """Raises an error with the likeliest units, among them the doubted one; without ``ask`` only
     notes it."""
@@ -271,8 +282,8 @@ def _ask(
     *others, last = (f"--unit {candidate.unit} ({candidate.size})" for candidate in choice)
     remedy = f"use {', '.join(others)} or {last}, or the metres in one unit"
     if ask:
-        raise InputError("PTM-I236", message, file=findings.model, remedy=remedy)
-    findings.note("PTM-N236", f"{message}; {remedy}")
+        raise InputError("PTM-I236", message, file=notes.model, remedy=remedy)
+    notes.note("PTM-N236", f"{message}; {remedy}")
 
 
 def to_world(points: Floats, space: Space) -> Floats:

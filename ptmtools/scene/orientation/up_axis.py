@@ -8,12 +8,12 @@ and adds them; the candidate of the lowest cost is the most likely one. No singl
 reliable, because each has buildings that violate it: walls without floors, a hall of one room, a
 tower.
 
-The unit follows from the size of the building and from its rooms (`standing`): their clear height,
-and whether a visitor can stand in them. The second excludes every unit that is too short, and only
-these: low buildings are rare, high ones are not. So the cost of a high room is low. Of the 39 made
-buildings of test_up_axis.py, as OBJ with Y up, the guess is right for 38 in metres, 37 in
-centimetres, 38 in millimetres, 30 in inches and 8 in feet. Rooms of 10 m in metres and of 10
-feet have the same numbers: of 36 in feet, feet are the guess or named beside it.
+The unit follows from the size of the building and from its rooms (`room_sizes`): their clear
+height, and whether a visitor can stand in them. The second excludes every unit that is too short,
+and only these: low buildings are rare, high ones are not. So the cost of a high room is low. Of the
+39 made buildings of test_up_axis.py, as OBJ with Y up, the guess is right for 38 in metres, 37 in
+centimetres, 38 in millimetres, 30 in inches and 8 in feet. Rooms of 10 m in metres and of 10 feet
+have the same numbers: of 36 in feet, feet are the guess or named beside it.
 
 Tried and rejected: the share of level area and the flatness of the bounding box alone. They lay a
 house of walls without floors, 19 × 11.4 × 3 m, on its side, since its walls are then all the level
@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.scene.orientation.facing import Crossings, SampleLines
-from ptmtools.scene.orientation.standing import HEIGHT, NO_ROOMS, Standing, standing
+from ptmtools.scene.orientation.room_sizes import HEIGHT, NO_ROOMS, RoomSizes, room_sizes
 
 Up = Literal["y", "z"]
 AXES: dict[Up, int] = {"y": 1, "z": 2}
@@ -113,7 +113,7 @@ class Evidence:
     crossed: ratio of wall areas in two directions: 0 if all walls are parallel, 1 if equal.
     named: share of the named area that is level or upright as its names state; 1 without names.
     door: median height of door leaves; 0 if none is named.
-    standing: the size of the rooms with floors and walls.
+    rooms: the size of the rooms with floors and walls.
     """
 
     width: float
@@ -127,12 +127,12 @@ class Evidence:
     crossed: float
     named: float
     door: float
-    standing: Standing = NO_ROOMS
+    rooms: RoomSizes = NO_ROOMS
 
     @property
     def storey(self) -> tuple[float, float]:
         """The clear height of most rooms, and the share of rooms that have it."""
-        return self.standing.storey if self.standing.heights else (self.room, self.alike)
+        return self.rooms.storey if self.rooms.heights else (self.room, self.alike)
 
 
 def evidence(
@@ -173,7 +173,7 @@ def evidence(
             ),
             named=as_named / named_area if named_area > _NAMED * total else 1.0,
             door=float(np.median(doors)) * scale if doors else 0.0,
-            standing=standing(
+            rooms=room_sizes(
                 lines,
                 crossings,
                 np.abs(normals[axis][:, axis]) > _LEVEL,
@@ -241,9 +241,8 @@ def _free_height(crossings: Crossings, height: float) -> tuple[float, float, flo
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 #: Prior cost of each unit.
 PRIOR = {"m": 0.0, "cm": 0.1, "mm": 0.1, "in": 0.5, "ft": 0.5}
-#: The up axis by the convention of a format that does not record one, and the cost of the other
-#: axis. OBJ: Y. Real OBJ files with Z up cost at least 1.5 more with Y up before this.
-USUAL_UP: dict[str, Up] = {".obj": "y"}
+#: The cost of another axis than that by the convention of a format. Real OBJ files with Z up cost
+#: at least 1.5 more with Y up before this.
 CONVENTION, UNUSUAL_UP = "usual up axis", 0.75
 #: The runner-up is printed if it costs at most this many times as much as the best candidate.
 RUNNER_UP = 3.0
@@ -317,8 +316,8 @@ class Candidate:
         measured, metres = self.evidence, self.metres
         width, height = measured.width * metres, measured.height * metres
         room = measured.storey[0] * metres
-        standing = measured.standing.heights or room >= HEIGHT
-        rooms = f", clear height of most rooms {room:.3g} m" if standing else ""
+        has_rooms = measured.rooms.heights or room >= HEIGHT
+        rooms = f", clear height of most rooms {room:.3g} m" if has_rooms else ""
         return f"{width:.3g} m wide and {height:.3g} m high{rooms}"
 
     @property
@@ -329,12 +328,12 @@ class Candidate:
     @property
     def too_low(self) -> bool:
         """Whether no visitor can stand in its rooms, if it has rooms."""
-        return self.evidence.standing.share(HEIGHT / self.metres) < FEWEST
+        return self.evidence.rooms.share(HEIGHT / self.metres) < FEWEST
 
     @property
     def too_high(self) -> bool:
         """Whether its rooms are higher than any."""
-        heights = self.evidence.standing.heights
+        heights = self.evidence.rooms.heights
         return bool(heights) and heights[len(heights) // 2] > HIGHEST / self.metres
 
     def rivals(self, best: Candidate) -> bool:
@@ -357,8 +356,8 @@ def candidates(
     numbers: bool = False,
 ) -> list[Candidate]:
     """The candidates for the evidence of each axis, the most likely first: for every unit, or for
-    one of ``metres``. ``usual`` is the up axis by convention (`USUAL_UP`). With ``numbers`` also
-    units without a name, in which the rooms have a usual height."""
+    one of ``metres``. ``usual`` is the up axis by convention. With ``numbers`` also units
+    without a name, in which the rooms have a usual height."""
     names = {length: name for name, length in UNITS.items()}
     units = UNITS if metres is None else {names.get(metres, f"{metres:g}"): metres}
     result = []
@@ -368,7 +367,7 @@ def candidates(
             costs = _costs(one, measured[_OTHER[up]], length)
             if metres is None:
                 # Says nothing on the axis: that with no rooms has no rooms that are too low.
-                costs["room for a visitor"] = _visitor_cost(one.standing, length)
+                costs["room for a visitor"] = _visitor_cost(one.rooms, length)
                 costs["usual unit"] = PRIOR.get(unit, NUMBER)
             costs[CONVENTION] = UNUSUAL_UP * (usual not in (None, up))
             result.append(Candidate(up, length, unit, one, costs))
@@ -379,7 +378,7 @@ def candidates(
 def _fitting_units(measured: Evidence) -> list[float]:
     """The units in which most rooms have a usual height, without those similar to one with a
     name."""
-    height, _ = measured.standing.storey
+    height, _ = measured.rooms.storey
     fitting = [float(f"{storey / height:.2g}") for storey in STOREYS] if height > 0 else []
     return [
         metres
@@ -436,12 +435,12 @@ def _room_cost(height: float) -> float:
     return min(2.0, max(0.0, 4 * _log_ratio(ROOMS[0], height), high))
 
 
-def _visitor_cost(standing: Standing, metres: float) -> float:
+def _visitor_cost(rooms: RoomSizes, metres: float) -> float:
     """From the share of places at which a visitor fits; a place with little more room than that
     counts half."""
-    if not standing.visitors:
+    if not rooms.visitors:
         return 0.0
-    share = (standing.share(HEIGHT / metres) + standing.share(ROOMS[0] / metres)) / 2
+    share = (rooms.share(HEIGHT / metres) + rooms.share(ROOMS[0] / metres)) / 2
     return NO_VISITOR * max(0.0, 1 - share / ENOUGH)
 
 

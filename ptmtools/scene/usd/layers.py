@@ -16,7 +16,7 @@ from typing import Any, Literal
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from ptmtools.errors import InputError
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.sandbox import unreadable
 
 #: Name of the library in messages.
@@ -29,7 +29,7 @@ _LONGEST = 300
 TIME = Usd.TimeCode.EarliestTime()
 
 
-def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
+def open_stage(path: Path, notes: IngestNotes) -> tuple[Any, list[str]]:
     """The composed stage of a model; and its other files, missing ones included, relative to the
     model's folder.
 
@@ -42,17 +42,17 @@ def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
     files: dict[str, None] = {}
     absent: dict[str, tuple[str, str]] = {}
     with Ar.ResolverContextBinder(context):
-        layers = _gathered(layer, files, absent, findings)
+        layers = _gathered(layer, files, absent, notes)
         try:
             stage = Usd.Stage.Open(layer, None, context)  # without a session
         except Tf.ErrorException as error:
             raise unreadable(LIBRARY, path, reason(error)) from None
-    files.update(_note_faults(stage, absent, findings))
+    files.update(_note_faults(stage, absent, notes))
     del layers  # kept until here so that the stage does not read them again
-    return stage, list(files | used_files(stage, path, findings))
+    return stage, list(files | used_files(stage, path, notes))
 
 
-def used_files(stage: Any, path: Path, findings: Findings) -> dict[str, None]:
+def used_files(stage: Any, path: Path, notes: IngestNotes) -> dict[str, None]:
     """The other files that a stage was read from, relative to the model's folder.
 
     Clips are opened when their values are read, so the result is complete only after reading.
@@ -61,7 +61,7 @@ def used_files(stage: Any, path: Path, findings: Findings) -> dict[str, None]:
     files: dict[str, None] = {}
     for used in stage.GetUsedLayers(includeClipLayers=True):
         if not used.anonymous:
-            files[_inside(file_of(used.realPath), findings)] = None
+            files[_inside(file_of(used.realPath), notes)] = None
     files.pop(path.name, None)
     return files
 
@@ -110,7 +110,7 @@ def _layer(identifier: str, file: Path) -> Any:
 
 
 def _gathered(
-    root: Any, files: dict[str, None], absent: dict[str, tuple[str, str]], findings: Findings
+    root: Any, files: dict[str, None], absent: dict[str, tuple[str, str]], notes: IngestNotes
 ) -> list[Any]:
     """All layers that are reachable from the root, in all variants. Adds the missing ones to
     ``absent``, by identifier: name, and place of the reference."""
@@ -126,30 +126,30 @@ def _gathered(
             visited.add(identifier)
             resolved = resolver.Resolve(identifier).GetPathString()
             if not resolved:
-                place = findings.folder.label(file_of(layer.realPath))
+                place = notes.folder.label(file_of(layer.realPath))
                 absent[identifier] = name, place
                 continue
             file = file_of(resolved)
-            _inside(file, findings, name)
+            _inside(file, notes, name)
             layers.append(_layer(identifier, file))
     return layers
 
 
-def _inside(file: Path, findings: Findings, name: str = "") -> str:
+def _inside(file: Path, notes: IngestNotes, name: str = "") -> str:
     """The file relative to the model's folder. Raises InputError PTM-I205 if it is not allowed."""
-    folder = findings.folder
+    folder = notes.folder
     if not folder.allow_outside and not file.resolve().is_relative_to(folder.root.resolve()):
         raise InputError(
             "PTM-I205",
             f"{name or file.name}: lies outside the model's folder",
-            file=findings.model,
+            file=notes.model,
             remedy="copy it into the folder, or pass --allow-outside",
         )
     return Path(os.path.relpath(file, folder.root)).as_posix()
 
 
 def _note_faults(
-    stage: Any, absent: dict[str, tuple[str, str]], findings: Findings
+    stage: Any, absent: dict[str, tuple[str, str]], notes: IngestNotes
 ) -> dict[str, None]:
     """Records the composition errors of a stage as misses; returns the names of missing files."""
     missing: dict[str, None] = {}
@@ -157,9 +157,9 @@ def _note_faults(
         reference = next((entry for key, entry in absent.items() if f"@{key}@" in text), None)
         if reference is not None:
             name, place = reference
-            findings.miss("PTM-N203", f"{name}: not found", place)
+            notes.miss("PTM-N203", f"{name}: not found", place)
             missing[name] = None
         else:
-            text = text.replace(f"{findings.folder.root}{os.sep}", "")
-            findings.miss("PTM-N214", text[:_LONGEST])
+            text = text.replace(f"{notes.folder.root}{os.sep}", "")
+            notes.miss("PTM-N214", text[:_LONGEST])
     return missing

@@ -22,10 +22,10 @@ from pxr import Ar, Sdf, Usd, UsdGeom, UsdShade
 from ptmtools.arrays import Floats, Ints
 from ptmtools.scene.colors import encoded, luminance, to_srgb
 from ptmtools.scene.messages import NamedImage
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import SourceMaterial, SourceWrap
 from ptmtools.scene.usd.layers import TIME
-from ptmtools.scene.usd.mesh import Shape, array, at_corners
+from ptmtools.scene.usd.mesh import UsdMesh, array, at_corners
 
 #: Defaults of UsdPreviewSurface (its specification, "Core Nodes").
 _DIFFUSE = (0.18, 0.18, 0.18)
@@ -40,7 +40,7 @@ Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Surface:
+class UsdSurface:
     """The supported properties of a material.
 
     Attributes
@@ -71,56 +71,56 @@ def _glow(shader: Any) -> float:
     return float(luminance(np.maximum(emitted, 0.0)))
 
 
-class MaterialReader:
+class UsdMaterialReader:
     """Reads each material of the file ``model`` once."""
 
-    def __init__(self, findings: Findings, model: Path) -> None:
-        self._findings = findings
+    def __init__(self, notes: IngestNotes, model: Path) -> None:
+        self._notes = notes
         self._model = model
-        self._surfaces: dict[str, Surface] = {}
+        self._surfaces: dict[str, UsdSurface] = {}
 
-    def read(self, material: Any) -> Surface:
+    def read(self, material: Any) -> UsdSurface:
         """The surface of a `UsdShade.Material`."""
         key = key_of(material.GetPrim())
         if key not in self._surfaces:
             self._surfaces[key] = self._read(material)
         return self._surfaces[key]
 
-    def _read(self, material: Any) -> Surface:
+    def _read(self, material: Any) -> UsdSurface:
         name, place = material.GetPrim().GetName(), str(material.GetPath())
         shader, *_ = material.ComputeSurfaceSource()
         if not shader or shader.GetIdAttr().Get(TIME) != "UsdPreviewSurface":
-            self._findings.miss("PTM-N214", f"{name}: no UsdPreviewSurface, ignored", place)
-            return Surface(SourceMaterial(name))
+            self._notes.miss("PTM-N214", f"{name}: no UsdPreviewSurface, ignored", place)
+            return UsdSurface(SourceMaterial(name))
         opacity, varies, from_image = self._opacity(shader, name, place)
         see_through = varies or from_image is not None
         plain = SourceMaterial(name, opacity=opacity, see_through=see_through, glow=_glow(shader))
         value, source, output = _resolved(shader.GetInput("diffuseColor"))
         if source is None:
-            self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
-            return Surface(replace(plain, color=tint(_numbers(value, _DIFFUSE))))
+            self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
+            return UsdSurface(replace(plain, color=tint(_numbers(value, _DIFFUSE))))
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
             colors = str(_resolved(source.GetInput("varname"))[0] or "")
-            return Surface(replace(plain, color=_WHITE), colors=colors)
+            return UsdSurface(replace(plain, color=_WHITE), colors=colors)
         if kind != "UsdUVTexture":
-            self._findings.miss("PTM-N214", f"{name}: colours of {kind} ignored", place)
-            return Surface(plain)
+            self._notes.miss("PTM-N214", f"{name}: colours of {kind} ignored", place)
+            return UsdSurface(plain)
         file = _resolved(source.GetInput("file"))[0]
         own_alpha = from_image == (_path_of(file), "a")
         if own_alpha:
             plain = replace(plain, see_through=varies)
         elif from_image is not None:
             message = f"{name}: image of opacities ignored, the material is transparent"
-            self._findings.note("PTM-N215", message, place)
+            self._notes.note("PTM-N215", message, place)
         if output not in ("rgb", "rgba"):
-            self._findings.note("PTM-N215", f"{name}: colour output {output} ignored", place)
+            self._notes.note("PTM-N215", f"{name}: colour output {output} ignored", place)
         image = self._image(source, file, name, place)
         if image is None:
-            return Surface(plain)
+            return UsdSurface(plain)
         cutoff = _threshold(shader) if own_alpha else 0.0
         material = replace(plain, color=_WHITE, ignores_alpha=not own_alpha, cutoff=cutoff or None)
-        return Surface(material, image, *self._coords(source, name, place))
+        return UsdSurface(material, image, *self._coords(source, name, place))
 
     def _opacity(self, shader: Any, name: str, place: str) -> tuple[float, bool, Any]:
         """The opacity; whether it varies or is tested, other than by the colour's image; and the
@@ -135,21 +135,21 @@ class MaterialReader:
         if source.GetIdAttr().Get(TIME) == "UsdUVTexture":
             return 1.0, threshold > 0, (_path_of(_resolved(source.GetInput("file"))[0]), output)
         message = f"{name}: opacity ignored, the material is transparent"
-        self._findings.note("PTM-N215", message, place)
+        self._notes.note("PTM-N215", message, place)
         return 1.0, True, None
 
     def _image(self, texture: Any, file: Any, name: str, place: str) -> NamedImage | None:
         path = _path_of(file)
         if not path:
-            self._findings.miss("PTM-N204", f"{name}: texture without an image", place)
+            self._notes.miss("PTM-N204", f"{name}: texture without an image", place)
             return None
         if "<UDIM>" in path:
-            self._findings.miss("PTM-N214", f"{path}: UDIM tiles ignored", place)
+            self._notes.miss("PTM-N214", f"{path}: UDIM tiles ignored", place)
             return None
         scale = _numbers(_resolved(texture.GetInput("scale"))[0], _ONES)
         bias = _numbers(_resolved(texture.GetInput("bias"))[0], _ZEROS)
         if scale != _ONES or bias != _ZEROS:
-            self._findings.note("PTM-N215", f"{path}: scale and bias ignored", place)
+            self._notes.note("PTM-N215", f"{path}: scale and bias ignored", place)
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
         return self._named(file, place, wrap_s, wrap_t)
 
@@ -160,7 +160,7 @@ class MaterialReader:
         resolved = file.resolvedPath
         if not resolved:
             return NamedImage(file.path, place, wrap_s, wrap_t)
-        folder = self._findings.folder.root
+        folder = self._notes.folder.root
         if not Ar.IsPackageRelativePath(resolved):
             name = Path(os.path.relpath(resolved, folder)).as_posix()
             return NamedImage(name, place, wrap_s, wrap_t)
@@ -175,7 +175,7 @@ class MaterialReader:
             info = archive.GetFileInfo(entry) if archive else None
             if info is None or info.compressionMethod or info.encrypted:
                 message = f"{inner}: compressed, or missing in its package"
-                self._findings.miss("PTM-N206", message, place)
+                self._notes.miss("PTM-N206", message, place)
                 return None
             offset, length = offset + info.dataOffset, info.size
             container, rest = Ar.JoinPackageRelativePath([container, entry]), nested
@@ -186,7 +186,7 @@ class MaterialReader:
     def _wrap(self, texture: Any, key: str, path: str, place: str) -> SourceWrap:
         mode = str(_resolved(texture.GetInput(key))[0] or "useMetadata")
         if mode not in _WRAPS:  # useMetadata without metadata is black, too
-            self._findings.note("PTM-N215", f"{path}: wrap mode black becomes clamp", place)
+            self._notes.note("PTM-N215", f"{path}: wrap mode black becomes clamp", place)
         return _WRAPS.get(mode, "clamp")
 
     def _coords(
@@ -201,7 +201,7 @@ class MaterialReader:
             matrix, transformed = matrix @ _transform(source), True
             source = _resolved(source.GetInput("in"))[1]
         if transformed:
-            self._findings.note("PTM-N215", f"{name}: UsdTransform2d baked into its faces", place)
+            self._notes.note("PTM-N215", f"{name}: UsdTransform2d baked into its faces", place)
         coords = ""
         if source is not None and source.GetIdAttr().Get(TIME) == "UsdPrimvarReader_float2":
             coords = str(_resolved(source.GetInput("varname"))[0] or "")
@@ -255,12 +255,12 @@ def _transform(shader: Any) -> Floats:
     return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0.0, 0.0, 1.0]])
 
 
-class Painter:
+class UsdPainter:
     """Assigns materials to meshes; each combination of material, sides and colour is one."""
 
-    def __init__(self, reader: MaterialReader, findings: Findings) -> None:
+    def __init__(self, reader: UsdMaterialReader, notes: IngestNotes) -> None:
         self._reader = reader
-        self._findings = findings
+        self._notes = notes
         self._number: dict[tuple[SourceMaterial, NamedImage | None], int] = {}
         self._coords: dict[tuple[Any, ...], Floats] = {}
         self._colors: dict[tuple[Any, ...], tuple[Color | None, NDArray[np.uint8] | None]] = {}
@@ -274,7 +274,7 @@ class Painter:
         return {number: image for (_, image), number in self._number.items() if image is not None}
 
     def paint(
-        self, prim: Any, shape: Shape, key: Any
+        self, prim: Any, shape: UsdMesh, key: Any
     ) -> tuple[Ints, Floats, NDArray[np.uint8] | None]:
         """The (T,) materials, (T, 3, 2) coordinates and, if there are any, (T, 3, 3) colours of a
         mesh, whose ``key`` is that of all its instances (`key_of`)."""
@@ -299,12 +299,12 @@ class Painter:
                 colors[faces] = own[faces]
         return material, uv, colors
 
-    def _bound(self, prim: Any, shape: Shape) -> tuple[list[Surface | None], Ints]:
+    def _bound(self, prim: Any, shape: UsdMesh) -> tuple[list[UsdSurface | None], Ints]:
         """The surfaces of a mesh, and (F,) the surface of each of its faces."""
         binding = UsdShade.MaterialBindingAPI(prim)
         subsets = binding.GetMaterialBindSubsets()
         face_surface = np.zeros(shape.faces, dtype=np.int64)
-        surfaces: list[Surface | None] = []
+        surfaces: list[UsdSurface | None] = []
         prims = [prim, *(subset.GetPrim() for subset in subsets)]
         materials, full = (
             UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, purpose)[0]
@@ -319,10 +319,10 @@ class Painter:
         return surfaces, face_surface
 
     def _material(
-        self, prim: Any, shape: Shape, key: Any, surface: Surface | None, two_sided: bool
+        self, prim: Any, shape: UsdMesh, key: Any, surface: UsdSurface | None, two_sided: bool
     ) -> tuple[SourceMaterial, NamedImage | None, NDArray[np.uint8] | None]:
         """The material of a surface on this mesh, and the colours of its corners."""
-        surface = surface or Surface(SourceMaterial("default"))
+        surface = surface or UsdSurface(SourceMaterial("default"))
         material, corners = replace(surface.material, two_sided=two_sided), None
         if surface.colors or (material.color is None and surface.image is None):
             color, corners = self._display(prim, shape, key, surface.colors or "displayColor")
@@ -337,7 +337,7 @@ class Painter:
         return material, surface.image, corners
 
     def _display(
-        self, prim: Any, shape: Shape, key: Any, name: str
+        self, prim: Any, shape: UsdMesh, key: Any, name: str
     ) -> tuple[Color | None, NDArray[np.uint8] | None]:
         """The colour of a mesh, and the colours of its corners, from a primvar."""
         primvar = _primvar(prim, name)
@@ -348,7 +348,7 @@ class Painter:
             values = self._at_corners(primvar, name, 3, prim, shape)
             colors: tuple[Color | None, NDArray[np.uint8] | None] = None, None
             if values is not None:
-                self._findings.note("PTM-N215", f"{name}: colour factor converted to sRGB")
+                self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB")
                 constant = primvar.GetInterpolation() == UsdGeom.Tokens.constant
                 colors = (tint(values[0, 0]), None) if constant else (_WHITE, encoded(values))
             self._colors[cached] = colors
@@ -364,10 +364,10 @@ class Painter:
         if (values == values[0]).all():
             return float(values[0]), False
         message = "varying displayOpacity ignored, the mesh is transparent"
-        self._findings.note("PTM-N215", message, str(prim.GetPath()))
+        self._notes.note("PTM-N215", message, str(prim.GetPath()))
         return 1.0, True
 
-    def _coordinates(self, prim: Any, shape: Shape, key: Any, surface: Surface) -> Floats:
+    def _coordinates(self, prim: Any, shape: UsdMesh, key: Any, surface: UsdSurface) -> Floats:
         """(T, 3, 2) coordinates of a surface's image on a mesh."""
         primvar = _primvar(prim, surface.coords)
         owner = key_of(primvar.GetAttr().GetPrim()) if primvar else None
@@ -377,7 +377,7 @@ class Painter:
             if primvar is None:
                 name = surface.material.name
                 bare = f"faces of textured material {name} have no texture coordinates"
-                self._findings.note("PTM-N229", bare, str(prim.GetPath()), len(shape.face))
+                self._notes.note("PTM-N229", bare, str(prim.GetPath()), len(shape.face))
             else:
                 values = self._at_corners(primvar, surface.coords, 2, prim, shape)
             if values is None:
@@ -390,13 +390,13 @@ class Painter:
         return self._coords[cached]
 
     def _at_corners(
-        self, primvar: Any, name: str, size: int, prim: Any, shape: Shape
+        self, primvar: Any, name: str, size: int, prim: Any, shape: UsdMesh
     ) -> Floats | None:
         """(T, 3, size) values of a primvar; None, and a miss, if they do not match the mesh."""
         values = at_corners(primvar, shape)
         if values is None or values.shape[2] != size:
             message = f"{name}: does not match the mesh, ignored"
-            self._findings.miss("PTM-N214", message, str(prim.GetPath()))
+            self._notes.miss("PTM-N214", message, str(prim.GetPath()))
             return None
         return values
 

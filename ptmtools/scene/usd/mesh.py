@@ -17,7 +17,7 @@ from pxr import UsdGeom
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.usd.layers import TIME
 
@@ -38,7 +38,7 @@ _PLANE_SIDES = {
 
 
 @dataclass(frozen=True)
-class Shape:
+class UsdMesh:
     """A mesh cut into triangles.
 
     Attributes
@@ -99,7 +99,7 @@ def _faces(prim: Any) -> tuple[Floats, Ints, Ints]:
     )
 
 
-def cut(prim: Any, findings: Findings, model: Path) -> Shape:
+def cut(prim: Any, notes: IngestNotes, model: Path) -> UsdMesh:
     """Cuts a prim of `is_cut` into triangles. Raises InputError PTM-I245 or PTM-I254 if its arrays
     are inconsistent."""
     place = str(prim.GetPath())
@@ -112,22 +112,22 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
         raise InputError("PTM-I245", "a face refers to a missing point", file=model, place=place)
     kept = counts >= 3
     if short := int((~kept).sum()):
-        findings.miss("PTM-N214", "faces of fewer than three corners", place, short)
+        notes.miss("PTM-N214", "faces of fewer than three corners", place, short)
     if prim.IsA(UsdGeom.Mesh):
         holes = array(UsdGeom.Mesh(prim).GetHoleIndicesAttr().Get(TIME), np.int64)
         kept[holes[(holes >= 0) & (holes < len(counts))]] = False
-        _note(prim, UsdGeom.Mesh(prim), findings)
+        _note(prim, UsdGeom.Mesh(prim), notes)
     face = np.flatnonzero(kept)
     corner = np.arange(len(vertex))[np.repeat(kept, counts)]
     start = np.concatenate([[0], np.cumsum(counts[face])])
     triangulation = triangulate(points[vertex[corner]], start)
-    triangulation.note(findings, place)
+    triangulation.note(notes, place)
     result = corner[triangulation.corner]
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get(TIME) == UsdGeom.Tokens.leftHanded:
         result = result[:, ::-1]
     # Unused points would be repeated for each instance.
     used, triangles = np.unique(vertex[result], return_inverse=True)
-    return Shape(
+    return UsdMesh(
         points=points[used],
         triangles=triangles.reshape(-1, 3),
         corner=result,
@@ -144,7 +144,7 @@ def inconsistent(model: Path, place: str, reason: str) -> InputError:
     return InputError("PTM-I254", reason, file=model, place=place, remedy=remedy)
 
 
-def at_corners(primvar: Any, shape: Shape) -> Floats | None:
+def at_corners(primvar: Any, shape: UsdMesh) -> Floats | None:
     """(T, 3, n) values of a primvar; None if they do not match the mesh."""
     raw = primvar.Get(TIME)
     if raw is None or not hasattr(raw, "__len__") or primvar.GetElementSize() != 1:
@@ -171,17 +171,17 @@ def at_corners(primvar: Any, shape: Shape) -> Floats | None:
     return values[rows] if len(values) >= needed else None
 
 
-def _note(prim: Any, mesh: Any, findings: Findings) -> None:
+def _note(prim: Any, mesh: Any, notes: IngestNotes) -> None:
     """Notes the unsupported properties of a mesh."""
     scheme = mesh.GetSubdivisionSchemeAttr().Get(TIME)
     if scheme not in (None, UsdGeom.Tokens.none):
-        findings.note("PTM-N215", f"subdivision surfaces ({scheme}) drawn as their control cages")
+        notes.note("PTM-N215", f"subdivision surfaces ({scheme}) drawn as their control cages")
     if prim.HasAttribute("primvars:skel:jointIndices"):
-        findings.note("PTM-N215", "skins drawn in their rest pose")
+        notes.note("PTM-N215", "skins drawn in their rest pose")
     if prim.HasRelationship("skel:blendShapeTargets"):
-        findings.note("PTM-N215", "blend shapes dropped")
+        notes.note("PTM-N215", "blend shapes dropped")
     if any(
         attribute.ValueMightBeTimeVarying()
         for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr())
     ):
-        findings.note("PTM-N215", "animated meshes drawn at their first time")
+        notes.note("PTM-N215", "animated meshes drawn at their first time")

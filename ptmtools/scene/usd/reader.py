@@ -13,62 +13,65 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.formats import USD, USDZ
 from ptmtools.scene.messages import pack_source, read_in_sandbox
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.options import USD
-from ptmtools.scene.sandbox import require, serve
-from ptmtools.scene.source import MAX_VERTICES, Source
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.sandbox import serve
+from ptmtools.scene.source import ModelSource
 
 #: Largest number of files in the model's folder whose size is read.
 _MOST_FILES = 100_000
 
 
-def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
+def read_usd(
+    path: Path, notes: IngestNotes, options: IngestOptions, progress: Progress = silent
+) -> ModelSource:
     """Reads a USD model.
 
     Raises InputError if it is damaged (PTM-I245, PTM-I254), has no mesh (PTM-I247), or
     refers to layers outside its folder (PTM-I205); LimitError PTM-L203, before arrays are
-    allocated, for more than ``max_triangles``, instances included; and MissingComponentError
-    PTM-M100.
+    allocated, for more triangles than ``options`` allow, instances included.
     """
-    require("pxr", "USD requires usd-core", "pip install 'ptmtools[usd]'")
-    outside = "outside" if findings.folder.allow_outside else ""
+    outside = "outside" if notes.folder.allow_outside else ""
     with tempfile.TemporaryDirectory() as scratch:
         return read_in_sandbox(
             __name__,
             "usd-core",
             path,
-            findings,
+            notes,
             scratch,
-            str(max_triangles),
+            str(options.max_triangles),
             outside,
-            other_bytes=_bytes_of_layers(findings.folder.root),
+            other_bytes=_bytes_of_layers(notes.folder.root),
         )
 
 
 def _bytes_of_layers(folder: Path) -> int:
     """The total size of the layers in a folder: a model often is a small layer that refers to
     others."""
-    total, left = 0, _MOST_FILES
+    suffixes = USD.suffixes + USDZ.suffixes
+    size, count = 0, 0
     for parent, _, names in os.walk(folder):
         for name in names:
-            if name.lower().endswith(USD):
+            if name.lower().endswith(suffixes):
                 with suppress(OSError):
-                    total += os.stat(os.path.join(parent, name)).st_size
-        left -= len(names) + 1
-        if left < 0:
+                    size += os.stat(os.path.join(parent, name)).st_size
+        count += len(names) + 1
+        if count > _MOST_FILES:
             break
-    return total
+    return size
 
 
-def _read_in_child(scratch: str, model: str, most: str, outside: str) -> dict[str, Any]:
+def _read_in_child(scratch: str, model: str, triangles: str, outside: str) -> dict[str, Any]:
     # Each thread allocates memory, and the library does little of the work.
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"
     from ptmtools.scene.usd.source import make_source
 
-    findings = Findings(Path(model), bool(outside))
-    source, images, files = make_source(Path(model), findings, int(most))
-    return pack_source(source, images, findings, scratch, files)
+    notes = IngestNotes(Path(model), bool(outside))
+    source, images, files = make_source(Path(model), notes, int(triangles))
+    return pack_source(source, images, notes, scratch, files)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Traverses a USD stage and makes a `Source` of its meshes, instances, materials and cameras.
+"""Traverses a USD stage and makes a `ModelSource` of its meshes, instances, materials and cameras.
 
 Data that a mesh shares with its instances is computed once. Native instances are traversed like
 other prims. The prototypes of a point instancer are traversed once, and their triangles are counted
@@ -19,11 +19,12 @@ from pxr import Tf, Usd, UsdGeom
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
+from ptmtools.scene.formats import too_many_triangles
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.model import Camera
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.sandbox import unreadable
-from ptmtools.scene.source import Rows, Source, too_many_triangles
+from ptmtools.scene.source import MeshArrays, ModelSource
 from ptmtools.scene.usd.layers import (
     LIBRARY,
     TIME,
@@ -33,8 +34,8 @@ from ptmtools.scene.usd.layers import (
     up_of,
     used_files,
 )
-from ptmtools.scene.usd.material import MaterialReader, Painter, key_of
-from ptmtools.scene.usd.mesh import Shape, array, cut, inconsistent, is_cut, triangles_of
+from ptmtools.scene.usd.material import UsdMaterialReader, UsdPainter, key_of
+from ptmtools.scene.usd.mesh import UsdMesh, array, cut, inconsistent, is_cut, triangles_of
 
 _HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
@@ -74,9 +75,9 @@ class Traversal:
     its prototype.
     """
 
-    def __init__(self, stage: Any, findings: Findings, model: Path) -> None:
+    def __init__(self, stage: Any, notes: IngestNotes, model: Path) -> None:
         self._stage = stage
-        self._findings = findings
+        self._notes = notes
         self._model = model
         self._cache = UsdGeom.XformCache(TIME)
         self._prototypes: dict[Any, Group | None] = {}
@@ -87,7 +88,7 @@ class Traversal:
         """The drawn prims of the stage; notes the others. Raises InputError PTM-I254."""
         result = self._below(self._stage.GetPseudoRoot(), None)
         for (missed, code, message), count in self._omitted.items():
-            (self._findings.miss if missed else self._findings.note)(code, message, "", count)
+            (self._notes.miss if missed else self._notes.note)(code, message, "", count)
         return result
 
     def name(self, prim: Any) -> str:
@@ -215,53 +216,58 @@ def _surfaces(prim: Any, predicate: Any) -> int:
 
 
 def make_source(
-    path: Path, findings: Findings, most: int
-) -> tuple[Source, dict[int, NamedImage], list[str]]:
+    path: Path, notes: IngestNotes, most: int
+) -> tuple[ModelSource, dict[int, NamedImage], list[str]]:
     """The model without textures; the images of its materials by number; and the names of its
     files. Raises the errors of `ptmtools.scene.usd.reader.read_usd`.
     """
     try:
-        return _make(path, findings, most)
+        return _make(path, notes, most)
     except Tf.ErrorException as error:  # damage that is detected when a value is read
         raise unreadable(LIBRARY, path, reason(error)) from None
 
 
 def _make(
-    path: Path, findings: Findings, most: int
-) -> tuple[Source, dict[int, NamedImage], list[str]]:
-    stage, files = open_stage(path, findings)
-    traversal = Traversal(stage, findings, path)
+    path: Path, notes: IngestNotes, most: int
+) -> tuple[ModelSource, dict[int, NamedImage], list[str]]:
+    stage, files = open_stage(path, notes)
+    traversal = Traversal(stage, notes, path)
     group = traversal.group()
     if group.triangles > most or group.places > most:
         raise too_many_triangles(most, path)
     if not group.triangles:
         raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with meshes")
-    painter = Painter(MaterialReader(findings, path), findings)
-    shapes: dict[str, Shape] = {}
-    rows = Rows()
+    painter = UsdPainter(UsdMaterialReader(notes, path), notes)
+    shapes: dict[str, UsdMesh] = {}
+    arrays = MeshArrays()
     for prim, name, frames in group.placed(np.eye(4)[None]):
         key = key_of(prim)
         if key not in shapes:
-            shapes[key] = cut(prim, findings, path)
+            shapes[key] = cut(prim, notes, path)
         shape = shapes[key]
         if len(shape.corner):
             material, uv, colors = painter.paint(prim, shape, key)
-            first = len(rows.names)
-            rows.names += [name] * len(frames)
-            columns = frames.transpose(0, 2, 1)  # the library's are for row vectors
-            rows.add(columns, shape.points, shape.triangles, uv, material, colors, first)
-    if not rows.names:
+            arrays.add(
+                arrays.add_objects(name, len(frames)),
+                shape.points,
+                shape.triangles,
+                frames=frames.transpose(0, 2, 1),  # the library's are for row vectors
+                uv=uv,
+                material=material,
+                colors=colors,
+            )
+    if not arrays.names:
         raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with meshes")
-    source = rows.source(
+    source = arrays.source(
         materials=painter.materials,
-        cameras=_cameras(traversal.cameras, findings),
+        cameras=_cameras(traversal.cameras, notes),
         metres=metres_of(stage),
         up=up_of(stage),
     )
-    return source, painter.images, list(dict.fromkeys(files) | used_files(stage, path, findings))
+    return source, painter.images, list(dict.fromkeys(files) | used_files(stage, path, notes))
 
 
-def _cameras(definitions: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[Camera, ...]:
+def _cameras(definitions: list[tuple[str, Floats, Any]], notes: IngestNotes) -> tuple[Camera, ...]:
     cameras: list[Camera] = []
     for name, matrix, prim in definitions:
         definition, view = UsdGeom.Camera(prim), 0.0
@@ -271,5 +277,5 @@ def _cameras(definitions: list[tuple[str, Floats, Any]], findings: Findings) -> 
         # Both lengths are in the same unit, a tenth of the stage's.
         if perspective and height > 0 < distance and math.isfinite(height / distance):
             view = 2 * math.atan(height / (2 * distance))
-        cameras += findings.camera(name, name, matrix[3, :3], 0.0 - matrix[2, :3], view)
+        cameras += notes.camera(name, name, matrix[3, :3], 0.0 - matrix[2, :3], view)
     return tuple(cameras)

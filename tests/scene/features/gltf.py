@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from ptmtools.scene import Scene
-from tests.scene.conftest import Gltf, Put, png
+from tests.scene.conftest import GltfModel, Put, png
 from tests.scene.features.registry import (
     ALPHA,
     BLUE,
@@ -34,13 +34,13 @@ from tests.scene.features.registry import (
 )
 
 
-def glb(put: Put, doc: Gltf, name: str = "a.glb") -> str:
+def glb(put: Put, doc: GltfModel, name: str = "a.glb") -> str:
     put(name, doc.glb())
     return name
 
 
 def with_texture(
-    doc: Gltf, data: bytes, use: dict[str, Any] | None = None, **material: Any
+    doc: GltfModel, data: bytes, use: dict[str, Any] | None = None, **material: Any
 ) -> dict[str, Any]:
     """Gives the document an image and a material that shows it."""
     doc.tree["images"] = [{"bufferView": doc.view(data), "mimeType": "image/png"}]
@@ -52,7 +52,7 @@ def with_texture(
 
 @feature("glTF", "textures", "carried over", four)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(**with_texture(doc, png(FOUR))))
     return glb(put, doc)
 
@@ -64,7 +64,7 @@ def orange(scene: Scene) -> None:
 @feature("glTF", "material colours", "carried over", orange, "PTM-N215")
 def _(put: Put) -> str:
     """Linear light of a half is 0.735 in sRGB (IEC 61966-2-1)."""
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1]}}]
     doc.place(doc.quad(material=0))
     return glb(put, doc)
@@ -75,7 +75,7 @@ CORNERS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
 
 @feature("glTF", "vertex colours", "carried over", vertex_colors)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     quad["attributes"]["COLOR_0"] = doc.add(CORNERS)
     doc.place(quad)
@@ -85,7 +85,7 @@ def _(put: Put) -> str:
 @feature("glTF", "vertex colours", "carried over", vertex_colors)
 def _colours_of_bytes(put: Put) -> str:
     """Normalised, with an alpha that an opaque material does not heed."""
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     rows = np.hstack([255 * CORNERS, [[9]] * 4]).astype(np.uint8)
     quad["attributes"]["COLOR_0"] = doc.add(rows, normalized=True)
@@ -102,7 +102,7 @@ def multiplied(scene: Scene) -> None:
 
 @feature("glTF", "vertex colours", "carried over", multiplied, "PTM-N215")
 def _colours_times_a_factor(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}]
     quad = doc.quad(material=0)
     quad["attributes"]["COLOR_0"] = doc.add(np.full((4, 3), 0.5, np.float32))
@@ -112,7 +112,7 @@ def _colours_times_a_factor(put: Put) -> str:
 
 @feature("glTF", "opacity", "carried over", half)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     base = {"baseColorFactor": [1, 1, 1, 0.5]}
     doc.tree["materials"] = [{"pbrMetallicRoughness": base, "alphaMode": "BLEND"}]
     doc.place(doc.quad(material=0))
@@ -121,7 +121,7 @@ def _(put: Put) -> str:
 
 @feature("glTF", "texture alpha", "carried over", cut_out)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     image = png(np.dstack([FOUR, ALPHA]))
     doc.place(doc.quad(**with_texture(doc, image, alphaMode="BLEND")))
     return glb(put, doc)
@@ -138,7 +138,7 @@ def tested(cutoff: float) -> Callable[[Scene], None]:
 
 @feature("glTF", "alpha cutoff", "carried over", tested(0.25))
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     image = png(np.dstack([FOUR, ALPHA]))
     doc.place(doc.quad(**with_texture(doc, image, alphaMode="MASK", alphaCutoff=0.25)))
     return glb(put, doc)
@@ -146,7 +146,7 @@ def _(put: Put) -> str:
 
 @feature("glTF", "alpha cutoff", "carried over", tested(0.5))
 def _default_cutoff(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     image = png(np.dstack([FOUR, ALPHA]))
     doc.place(doc.quad(**with_texture(doc, image, alphaMode="MASK")))
     return glb(put, doc)
@@ -160,7 +160,7 @@ def invisible(scene: Scene) -> None:
 @feature("glTF", "alpha cutoff", "carried over", invisible, "PTM-N211")
 def _below_the_cutoff(put: Put) -> str:
     """The factor's alpha alone is less than the cutoff."""
-    doc = Gltf()
+    doc = GltfModel()
     material = with_texture(doc, png(FOUR), alphaMode="MASK")
     doc.tree["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.3]
     doc.place(doc.quad(**material))
@@ -169,7 +169,7 @@ def _below_the_cutoff(put: Put) -> str:
 
 @feature("glTF", "texture transforms", "baked", twice, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
     doc.place(doc.quad(**with_texture(doc, png(FOUR), use)))
     return glb(put, doc)
@@ -184,7 +184,7 @@ def turned(scene: Scene) -> None:
 @feature("glTF", "texture transforms", "baked", turned, "PTM-N215")
 def _turned_texture(put: Put) -> str:
     """u' = cos·u + sin·v + offset, v' = −sin·u + cos·v + offset (KHR_texture_transform)."""
-    doc = Gltf()
+    doc = GltfModel()
     moved = {"rotation": float(np.pi / 2), "offset": [0, 1]}
     use = {"extensions": {"KHR_texture_transform": moved}}
     doc.place(doc.quad(**with_texture(doc, png(FOUR), use)))
@@ -193,7 +193,7 @@ def _turned_texture(put: Put) -> str:
 
 @feature("glTF", "clamped textures", "carried over", clamped, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
     material = with_texture(doc, png(FOUR), use)
     doc.tree["samplers"] = [{"wrapS": 33071}]
@@ -202,7 +202,7 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-def repeating(doc: Gltf, scale: list[float]) -> dict[str, Any]:
+def repeating(doc: GltfModel, scale: list[float]) -> dict[str, Any]:
     material = with_texture(
         doc, png(FOUR), {"extensions": {"KHR_texture_transform": {"scale": scale}}}
     )
@@ -214,7 +214,7 @@ def repeating(doc: Gltf, scale: list[float]) -> dict[str, Any]:
 @feature("glTF", "mirrored textures", "baked", mirrored, "PTM-N215", "PTM-N215")
 def _(put: Put) -> str:
     """Three repetitions across and two down: the image beside its mirror images."""
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(**repeating(doc, [2.5, 2])))
     return glb(put, doc)
 
@@ -230,7 +230,7 @@ def folded(scene: Scene) -> None:
 @feature("glTF", "mirrored textures", "baked", folded, "PTM-N215", "PTM-N215")
 def _mirrored_within_a_repetition(put: Put) -> str:
     """The second one: the coordinates are mirrored, and the image stays."""
-    doc = Gltf()
+    doc = GltfModel()
     material = repeating(doc, [1, 1])
     use = doc.tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
     use["extensions"]["KHR_texture_transform"] = {"offset": [1, 0]}
@@ -242,7 +242,7 @@ def _mirrored_within_a_repetition(put: Put) -> str:
 def _(put: Put) -> str:
     stream = io.BytesIO()
     Image.fromarray(FOUR.repeat(8, 0).repeat(8, 1)).save(stream, "webp", lossless=True)
-    doc = Gltf()
+    doc = GltfModel()
     material = with_texture(doc, stream.getvalue())
     doc.tree["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
     doc.tree["extensionsRequired"] = ["EXT_texture_webp"]
@@ -258,7 +258,7 @@ def first_image(scene: Scene) -> None:
 @feature("glTF", "WebP", "carried over", first_image)
 def _webp_beside_png(put: Put) -> str:
     """The image for those without the extension has lost less."""
-    doc = Gltf()
+    doc = GltfModel()
     material = with_texture(doc, png(FOUR))
     doc.tree["images"].append({"bufferView": doc.view(b"RIFF"), "mimeType": "image/webp"})
     doc.tree["textures"] = [{"source": 0, "extensions": {"EXT_texture_webp": {"source": 1}}}]
@@ -279,7 +279,7 @@ KTX2 = base64.b64decode(
 
 @feature("glTF", "KTX2", "carried over", four)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     material = with_texture(doc, KTX2)
     doc.tree["images"][0]["mimeType"] = "image/ktx2"
     doc.tree["textures"] = [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]
@@ -290,7 +290,7 @@ def _(put: Put) -> str:
 
 @feature("glTF", "instances", "carried over", three_quads)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     moved = np.array([[0, 0, 0], [0, 0, 5], [0, 0, -5]], np.float32)
     turns = np.array([[0, 0, 0, 32767], [0, 0, 32767, 0], [0, 0, 0, 32767]], np.int16)
     scales = np.array([[1, 1, 1], [1, 1, 1], [2, 1, 1]], np.float32)
@@ -307,7 +307,7 @@ def _(put: Put) -> str:
 @feature("glTF", "sparse accessors", "carried over", the_quad)
 def _(put: Put) -> str:
     """Two of four corners are written over what the buffer has."""
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     wrong = np.array([[0, 0, 0], [9, 9, 9], [10, 4, 0], [9, 9, 9]], np.float32)
     right = np.array([[10, 0, 0], [0, 4, 0]], np.float32)
@@ -327,7 +327,7 @@ def _(put: Put) -> str:
 @feature("glTF", "sparse accessors", "carried over", the_quad)
 def _sparse_over_nothing(put: Put) -> str:
     """What is not written is 0."""
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     right = np.array([[10, 0, 0], [10, 4, 0], [0, 4, 0]], np.float32)
     index = doc.view(np.array([1, 2, 3], np.uint8).tobytes())
@@ -351,7 +351,7 @@ def _sparse_over_nothing(put: Put) -> str:
 @feature("glTF", "quantised meshes", "carried over", four)
 def _(put: Put) -> str:
     """Positions of 16 bits, as they are and normalised coordinates (KHR_mesh_quantization)."""
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad(**with_texture(doc, png(FOUR)))
     corners = np.array([[0, 0, 0], [1000, 0, 0], [1000, 400, 0], [0, 400, 0]], np.int16)
     coords = np.array([[0, 65535], [65535, 65535], [65535, 0], [0, 0]], np.uint16)
@@ -362,7 +362,9 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-def compressed(doc: Gltf, extension: str = "EXT_meshopt_compression", version: int = 0) -> Gltf:
+def compressed(
+    doc: GltfModel, extension: str = "EXT_meshopt_compression", version: int = 0
+) -> GltfModel:
     """With all its buffer views of vertices and indices compressed, and nothing in their place."""
     import meshopt
 
@@ -399,19 +401,19 @@ def compressed(doc: Gltf, extension: str = "EXT_meshopt_compression", version: i
 
 @feature("glTF", "meshopt compression", "carried over", four)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(**with_texture(doc, png(FOUR))))
     return glb(put, compressed(doc))
 
 
 @feature("glTF", "meshopt compression", "carried over", four)
 def _meshopt_of_khronos(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(**with_texture(doc, png(FOUR))))
     return glb(put, compressed(doc, "KHR_meshopt_compression", 1))
 
 
-def draco(doc: Gltf, quad: dict[str, Any]) -> dict[str, Any]:
+def draco(doc: GltfModel, quad: dict[str, Any]) -> dict[str, Any]:
     """A primitive like that, compressed with Draco, and nothing in its place."""
     import DracoPy
 
@@ -432,7 +434,7 @@ def draco(doc: Gltf, quad: dict[str, Any]) -> dict[str, Any]:
 
 @feature("glTF", "Draco compression", "carried over", four)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(draco(doc, doc.quad(**with_texture(doc, png(FOUR)))))
     return glb(put, doc)
 
@@ -440,7 +442,7 @@ def _(put: Put) -> str:
 @feature("glTF", "Draco compression", "carried over", the_quad)
 def _draco_beside_plain_data(put: Put) -> str:
     """What is compressed need not be read, and here cannot be."""
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     reported = {"bufferView": doc.view(b"DRACO"), "attributes": {"POSITION": 0}}
     doc.place(quad | {"extensions": {"KHR_draco_mesh_compression": reported}})
@@ -449,7 +451,7 @@ def _draco_beside_plain_data(put: Put) -> str:
 
 @feature("glTF", "unlit materials", "carried over", four)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     material = with_texture(doc, png(FOUR), extensions={"KHR_materials_unlit": {}})
     doc.tree["extensionsRequired"] = ["KHR_materials_unlit"]
     doc.place(doc.quad(**material))
@@ -458,7 +460,7 @@ def _(put: Put) -> str:
 
 @feature("glTF", "specular-glossiness materials", "carried over", four)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     with_texture(doc, png(FOUR))
     glossy = {"diffuseTexture": {"index": 0}}
     doc.tree["materials"] = [{"extensions": {"KHR_materials_pbrSpecularGlossiness": glossy}}]
@@ -473,7 +475,7 @@ def through(scene: Scene) -> None:
 
 @feature("glTF", "transmission", "noted", through, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     glass = {"KHR_materials_transmission": {"transmissionFactor": 0.9}}
     doc.tree["materials"] = [{"extensions": glass}]
     doc.place(doc.quad(material=0))
@@ -482,28 +484,28 @@ def _(put: Put) -> str:
 
 @feature("glTF", "triangle strips and fans", "carried over", the_quad)
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad() | {"mode": 6, "indices": doc.add(np.array([0, 1, 2, 3], np.uint16))})
     return glb(put, doc)
 
 
 @feature("glTF", "triangle strips and fans", "carried over", the_quad)
 def _strip(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad() | {"mode": 5, "indices": doc.add(np.array([0, 1, 3, 2], np.uint16))})
     return glb(put, doc)
 
 
 @feature("glTF", "points and lines", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     doc.place(doc.quad(), doc.quad() | {"mode": 1})
     return glb(put, doc)
 
 
 @feature("glTF", "hidden nodes", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     hidden = {"extensions": {"KHR_node_visibility": {"visible": False}}, "children": [2]}
     doc.tree["nodes"] += [{"mesh": 0, "translation": [99, 0, 0], **hidden}, {"mesh": 0}]
     doc.tree["scenes"] = [{"nodes": [0, 1]}]
@@ -512,7 +514,7 @@ def _(put: Put) -> str:
 
 @feature("glTF", "skins and morph targets", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf()
+    doc = GltfModel()
     target = doc.add(np.zeros((4, 3), np.float32))
     doc.place(doc.quad(targets=[{"POSITION": target}]))
     return glb(put, doc)
@@ -520,7 +522,7 @@ def _(put: Put) -> str:
 
 @feature("glTF", "cameras", "carried over", seen)
 def _(put: Put) -> str:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     doc.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}]
     doc.tree["nodes"].append({"camera": 0, "translation": [5, 2, 5]})
     doc.tree["scenes"] = [{"nodes": [0, 1]}]
@@ -533,13 +535,13 @@ def asked(text: str) -> None:
 
 @feature("glTF", "unknown required extension", "refused", asked, "PTM-I243")
 def _(put: Put) -> str:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     doc.tree["extensionsRequired"] = ["EXT_texture_avif"]
     return glb(put, doc)
 
 
 @feature("glTF", "unknown optional extension", "noted", the_quad, "PTM-N215")
 def _(put: Put) -> str:
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     doc.tree["extensionsUsed"] = ["MSFT_lod"]
     return glb(put, doc)

@@ -13,7 +13,7 @@ from ptmtools.cells import Cells, subdivide
 from ptmtools.errors import LimitError
 from ptmtools.scene import Scene, ingest
 from tests.scene.buildings import HIGH, WIDE, house
-from tests.scene.conftest import Gltf, Put, noise, png
+from tests.scene.conftest import GltfModel, Put, noise, png
 from tests.scene.features.gltf import compressed
 
 #: Bits of the grid that encoders take where nobody says otherwise.
@@ -27,11 +27,11 @@ def _components(require: Callable[[str, str], None]) -> None:
             require(module, f"pip install {module}")
 
 
-def building() -> tuple[Gltf, list[np.ndarray]]:
+def building() -> tuple[GltfModel, list[np.ndarray]]:
     """Each wall, floor and roof a primitive of its own, (n, 3, 3) triangles, Y up."""
     corners = house()[..., [0, 2, 1]] * [1, 1, -1]
     parts = np.array_split(corners, max(1, len(corners) // 12))
-    doc = Gltf()
+    doc = GltfModel()
     doc.tree["images"] = [
         {"bufferView": doc.view(png(noise(seed))), "mimeType": "image/png"} for seed in (1, 2)
     ]
@@ -43,7 +43,7 @@ def building() -> tuple[Gltf, list[np.ndarray]]:
     return doc, parts
 
 
-def floats() -> Gltf:
+def floats() -> GltfModel:
     """All as it is."""
     doc, parts = building()
     for n, part in enumerate(parts):
@@ -144,7 +144,7 @@ def test_what_unpacks_to_more_than_can_be_meant(put: Put, monkeypatch: pytest.Mo
     """Equal bytes take a thousandth of what they unpack to."""
     from ptmtools.scene.gltf import document as module
 
-    doc = Gltf.wall()
+    doc = GltfModel.wall()
     for count, refused in ((4, False), (400_000, True)):
         block = min(count, 256)
         control = bytes([0xAA]) * (3 * -(-count // block))
@@ -154,9 +154,9 @@ def test_what_unpacks_to_more_than_can_be_meant(put: Put, monkeypatch: pytest.Mo
         extension = {"KHR_meshopt_compression": reported}
         view = {"buffer": 0, "byteLength": 12 * count, "extensions": extension}
         tree = doc.tree | {"bufferViews": [view]}
-        made = module.Document(put("a.glb", b""), tree, [module.Buffer(data, None)])
+        made = module.GltfDocument(put("a.glb", b""), tree, [module.Buffer(data, None)])
         monkeypatch.setattr(module, "_DECODED", 1 << 20)
-        made = module.Document(made.path, tree, [module.Buffer(data, None)])
+        made = module.GltfDocument(made.path, tree, [module.Buffer(data, None)])
         if refused:
             with pytest.raises(LimitError, match=r"4 MiB.*PTM-L204"):
                 made.view(0)

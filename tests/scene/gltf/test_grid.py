@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings, strategies as st
 
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
-from ptmtools.scene.gltf.draco import Decoded
+from ptmtools.scene.gltf.compression import DracoMesh
 from ptmtools.tolerance import COARSEST
-from tests.scene.conftest import Gltf, Put
+from tests.scene.conftest import GltfModel, Put
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -24,14 +24,14 @@ def _draco(require: Callable[[str, str], None]) -> None:
         require("DracoPy", "pip install DracoPy")
 
 
-def decoded(points: np.ndarray, bits: int) -> tuple[Decoded, int]:
+def decoded(points: np.ndarray, bits: int) -> tuple[DracoMesh, int]:
     import DracoPy
 
     faces = np.arange(len(points) // 3 * 3, dtype=np.uint32).reshape(-1, 3)
     data = DracoPy.encode(points, faces, quantization_bits=bits)
     rows = DracoPy.decode(data).attributes
     attributes = {row["unique_id"]: row["data"] for row in rows}
-    return Decoded(faces.astype(np.int64), attributes, data), rows[0]["unique_id"]
+    return DracoMesh(faces.astype(np.int64), attributes, data), rows[0]["unique_id"]
 
 
 @settings(max_examples=60)
@@ -61,14 +61,14 @@ def test_the_step_is_the_encoders(seed: int) -> None:
 def test_what_is_not_known_is_0() -> None:
     actual, attribute = decoded(np.random.default_rng(1).random((9, 3)), 14)
     assert actual.step(attribute + 99) == 0
-    assert Decoded(actual.triangles, actual.attributes, b"").step(attribute) == 0
+    assert DracoMesh(actual.triangles, actual.attributes, b"").step(attribute) == 0
     whole = {attribute: actual.attributes[attribute].astype(np.int16)}
-    assert Decoded(actual.triangles, whole, actual.data).step(attribute) is None
+    assert DracoMesh(actual.triangles, whole, actual.data).step(attribute) is None
 
 
-def blocks(scale: float) -> Gltf:
+def blocks(scale: float) -> GltfModel:
     """A room of whole numbers."""
-    doc = Gltf()
+    doc = GltfModel()
     quad = doc.quad()
     corners = np.array([[0, 0, 0], [100, 0, 0], [100, 40, 0], [0, 40, 0]], np.int16)
     quad["attributes"]["POSITION"] = doc.add(corners)
@@ -85,14 +85,14 @@ def test_a_step_is_told_and_bounded(put: Put) -> None:
     assert message.startswith(
         "compressed: coordinates are rounded to 1e+03 mm, so points within 15 mm "
     )
-    float_ = ingest(put("a.glb", Gltf.wall().glb()))
+    float_ = ingest(put("a.glb", GltfModel.wall().glb()))
     assert float_.tolerance.step == 0
     assert "PTM-N201" not in {note.code for note in float_.notes}
 
 
 def test_a_coarse_mesh_beside_a_small_one_that_is_turned(put: Put) -> None:
     """The tolerances go by the building's own axes, along which it is smaller."""
-    doc = Gltf()
+    doc = GltfModel()
     turn = {"rotation": [0.0, 0.0, float(np.sin(np.pi / 8)), float(np.cos(np.pi / 8))]}
     doc.place(doc.quad(), scale=[0.1, 0.25, 1], **turn)
     quad = doc.quad()
@@ -105,7 +105,7 @@ def test_draco_of_more_than_the_accessor_says(put: Put) -> None:
     """Nothing is drawn more often than was counted."""
     from tests.scene.features.gltf import draco
 
-    doc = Gltf()
+    doc = GltfModel()
     quad = draco(doc, doc.quad())
     doc.place(quad)
     doc.tree["accessors"][quad["indices"]]["count"] = 3
@@ -117,7 +117,7 @@ def test_draco_without_indices_has_its_own(put: Put) -> None:
     from tests.scene.features.gltf import draco
     from tests.scene.features.registry import the_quad
 
-    doc = Gltf()
+    doc = GltfModel()
     quad = draco(doc, doc.quad())
     del quad["indices"]
     doc.place(quad)
@@ -127,17 +127,17 @@ def test_draco_without_indices_has_its_own(put: Put) -> None:
 def test_zeros_without_end_are_searched_no_further(put: Put) -> None:
     """A mark of zeros is found at every byte."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], np.float32)
-    stream = Decoded(np.zeros((0, 3), np.int64), {0: points}, bytes(1 << 20))
+    stream = DracoMesh(np.zeros((0, 3), np.int64), {0: points}, bytes(1 << 20))
     assert stream.step(0) == 0
     huge = np.array([[-3e38] * 3, [3e38] * 3], np.float32)
-    assert Decoded(np.zeros((0, 3), np.int64), {0: huge}, bytes(100)).step(0) == 0
+    assert DracoMesh(np.zeros((0, 3), np.int64), {0: huge}, bytes(100)).step(0) == 0
 
 
 def test_draco_of_a_strip_has_triangles(put: Put) -> None:
     from tests.scene.features.gltf import draco
     from tests.scene.features.registry import the_quad
 
-    doc = Gltf()
+    doc = GltfModel()
     quad = draco(doc, doc.quad()) | {"mode": 5}
     doc.tree["accessors"][quad["indices"]]["count"] = 4
     doc.place(quad)

@@ -7,23 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.scene.ifc import reader as ifc
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import MAX_VERTICES, Source
+from ptmtools.scene.formats import MAX_VERTICES
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import ModelSource
+from tests.scene.conftest import read_source
 
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 
 
-def read(file: Path, most: int = MAX_VERTICES) -> tuple[Source, Findings]:
-    findings = Findings(file)
-    return ifc.read_ifc(file, findings, most), findings
+def read(file: Path, most: int = MAX_VERTICES) -> tuple[ModelSource, IngestNotes]:
+    findings = IngestNotes(file)
+    return read_source(file, findings, max_triangles=most), findings
 
 
-def notes(findings: Findings) -> list[tuple[str, str, int]]:
-    return [(note.code, note.message, note.count) for note in findings.notes]
+def notes(findings: IngestNotes) -> list[tuple[str, str, int]]:
+    return [(note.code, note.message, note.count) for note in findings.entries]
 
 
-def corners(source: Source, name: str) -> Floats:
+def corners(source: ModelSource, name: str) -> Floats:
     """(T, 3, 3) of all objects of a name."""
     chosen = [i for i, called in enumerate(source.objects) if called == name]
     return source.points[source.triangles[np.isin(source.triangle_object, chosen)]]

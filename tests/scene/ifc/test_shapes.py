@@ -12,9 +12,9 @@ import pytest
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene import IngestOptions, ingest
+from ptmtools.scene.formats import MAX_VERTICES
 from ptmtools.scene.ifc import products as ifc_products
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import MAX_VERTICES
+from ptmtools.scene.notes import IngestNotes
 from tests.scene.ifc.ifc_house import DEEP, HIGH, THICK, WIDE, Ifc, house
 from tests.scene.ifc.reading import corners, notes, read, size, volume
 
@@ -40,7 +40,7 @@ def test_one_representation_of_several(tmp_path: Path) -> None:
     source, findings = read(made.write(tmp_path / "wall.ifc"))
     assert size(corners(source, "IfcWall Wall")) == [4, 1, 3]
     assert len(corners(source, "IfcWall Wall")) == 12
-    assert all(re.search("^lengths|not drawn$", note.message) for note in findings.notes)
+    assert all(re.search("^lengths|not drawn$", note.message) for note in findings.entries)
 
 
 def test_only_lines(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_what_cannot_be_made_is_missed(tmp_path: Path) -> None:
     file = made.write(tmp_path / "wall.ifc")
     source, findings = read(file)
     assert source.objects == ("IfcWall Good",)
-    (missed,) = [note for note in findings.notes if note.code == "PTM-N253"]
+    (missed,) = [note for note in findings.entries if note.code == "PTM-N253"]
     assert missed.message.startswith("IfcWall Bad: geometry cannot be computed")
     assert missed.place == f"GlobalId {bad.GlobalId}"
     with pytest.raises(InputError, match=r"IfcWall Bad.*PTM-I253"):
@@ -90,7 +90,7 @@ def test_the_order_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.Monke
             yield from plain(file, [product])
 
     monkeypatch.setattr(ifc_products, "elements", backwards)
-    findings = Findings(path)
+    findings = IngestNotes(path)
     turned = ifc_products.read_products(library.open(str(path)), findings, MAX_VERTICES)
     for name, value in vars(read(path)[0]).items():
         assert np.array_equal(value, getattr(turned, name)), name
@@ -156,7 +156,7 @@ class TestTriangles:
         assert size(actual) == [1, 2, 3 - cut]
         assert np.isclose(volume(actual), 6 - 2 * cut)
         assert [source.materials[i].name for i in np.unique(source.triangle_material)] == ["Blue"]
-        assert all(re.search("^lengths|not drawn$", note.message) for note in findings.notes)
+        assert all(re.search("^lengths|not drawn$", note.message) for note in findings.entries)
 
     def test_a_concave_polygon(self, tmp_path: Path) -> None:
         """No fan: an area of 4 m², not of 12."""

@@ -27,7 +27,7 @@ from tests.scene.buildings import (
     welded,
     y_up,
 )
-from tests.scene.conftest import Gltf, Put
+from tests.scene.conftest import GltfModel, Put
 
 #: Solids that face outwards, which is towards the rooms between them.
 SOUND = {
@@ -83,7 +83,7 @@ def test_where_there_are_no_rooms_nothing_is_said() -> None:
 def glb(triangles: Floats) -> bytes:
     """A glTF file of these Z-up triangles, Y up as it should be, whose faces have no backs."""
     points, faces = welded(y_up(triangles))
-    document = Gltf()
+    document = GltfModel()
     position = document.add(points.astype(np.float32))
     indices = document.add(faces.reshape(-1).astype(np.uint16))
     document.place({"attributes": {"POSITION": position}, "indices": indices})

@@ -11,7 +11,7 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Space
-from ptmtools.scene.notes import Findings
+from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.orientation.space import UNITS, DeclaredSpace, parse_unit, rotated, settle
 from ptmtools.scene.orientation.up_axis import NamedFaces
 from tests.scene.buildings import atrium, box, corridor, house, site_plan, tower, welded, y_up
@@ -54,10 +54,10 @@ def settled(
 ) -> tuple[Space, dict]:
     """The space of triangles, and the notes on it by code."""
     points, faces = welded(triangles)
-    findings = Findings(Path("house.obj"))
+    findings = IngestNotes(Path("house.obj"))
     named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
-    space = settle(Path("house.obj"), points, faces, named, by_user, by_format, findings)
-    return space, {note.code: note.message for note in findings.notes}
+    space = settle(points, faces, named, by_user, by_format, findings)
+    return space, {note.code: note.message for note in findings.entries}
 
 
 def test_guesses_are_noted() -> None:
@@ -193,12 +193,12 @@ def _width(triangles: Floats) -> float:
 def test_without_asking_an_impossible_unit_is_noted() -> None:
     points, faces = welded(y_up(of_extent(house(), 1)))
     for by_format in (NOTHING, GLTF):
-        findings = Findings(Path("house.obj"))
+        findings = IngestNotes(Path("house.obj"))
         named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
         model = Path("house.obj")
         space = settle(model, points, faces, named, NOTHING, by_format, findings, ask=False)
         assert (space.metres, space.up) == (1.0, "y")
-        assert {n.code for n in findings.notes} - {"PTM-N202", "PTM-N238"} == {"PTM-N236"}
+        assert {n.code for n in findings.entries} - {"PTM-N202", "PTM-N238"} == {"PTM-N236"}
 
 
 @pytest.mark.parametrize("name", BUILDINGS)

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ptmtools.scene.formats import MAX_VERTICES
 from ptmtools.scene.messages import NamedImage
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import MAX_VERTICES, Source
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import ModelSource
 
 
 class Read:
@@ -21,9 +22,9 @@ class Read:
 
         path = folder / f"{len(os.listdir(folder))}.usda"
         stage.GetRootLayer().Export(str(path))
-        findings = Findings(path)
+        findings = IngestNotes(path)
         self.source, self.images, self.files = make_source(path, findings, most)
-        self.notes = findings.notes
+        self.notes = findings.entries
         self.codes = {note.code for note in self.notes}
 
     @property
@@ -52,7 +53,7 @@ class Read:
         return list(actual.tolist())
 
 
-def equal(a: Source, b: Source) -> bool:
+def equal(a: ModelSource, b: ModelSource) -> bool:
     """Whether two sources have the same surfaces, in the same order."""
     return (
         np.array_equal(a.points, b.points)

@@ -10,10 +10,10 @@ import pytest
 
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, ingest
-from ptmtools.scene.formats import read_other
-from ptmtools.scene.notes import Findings
-from ptmtools.scene.source import MAX_VERTICES, FileRange
-from tests.scene.conftest import Put, noise, png
+from ptmtools.scene.formats import MAX_VERTICES
+from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.source import FileRange
+from tests.scene.conftest import Put, noise, png, read_source
 
 if find_spec("pxr") is not None:
     from pxr import Usd, UsdGeom
@@ -188,9 +188,7 @@ def test_images_in_packages(put: Put, tmp_path: Path) -> None:
         assert [image.load() for image in scene.images] == [png(noise(1))]
         assert scene.images[0].name == "wood.png"
     assert ingest(tmp_path / "a.usda").files == ("parts.usdz",)
-    texture = (
-        read_other(tmp_path / "parts.usdz", Findings(tmp_path / "parts.usdz")).materials[0].texture
-    )
+    texture = read_source(tmp_path / "parts.usdz").materials[0].texture
     assert texture is not None
     assert isinstance(texture.read, FileRange)
 
@@ -228,8 +226,8 @@ def test_clips_are_files_of_the_model(tmp_path: Path, outside: bool) -> None:
 
     if outside:
         with pytest.raises(InputError, match="PTM-I205"):
-            make_source(root, Findings(root), MAX_VERTICES)
+            make_source(root, IngestNotes(root), MAX_VERTICES)
         return
-    source, _, files = make_source(root, Findings(root), MAX_VERTICES)
+    source, _, files = make_source(root, IngestNotes(root), MAX_VERTICES)
     assert len(source.triangles) == 2
     assert {"clip.usda", "manifest.usda"} <= set(files)

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from ptmtools.scene import ingest
-from ptmtools.scene.formats import read_other
-from ptmtools.scene.notes import Findings
-from tests.scene.conftest import Put, noise, png
+from ptmtools.scene.notes import IngestNotes
+from tests.scene.conftest import Put, noise, png, read_source
 
 if find_spec("pxr") is not None:
     from pxr import Gf, Usd, UsdGeom, UsdSkel
@@ -30,9 +29,9 @@ def test_the_same_of_all_kinds_of_files(put: Put, tmp_path: Path) -> None:
     made.package(tmp_path / "b.usdc", tmp_path / "d.usdz")
     sources, notes = [], []
     for name in ("a.usda", "b.usdc", "c.usd", "d.usdz"):
-        findings = Findings(tmp_path / name)
-        sources.append(read_other(tmp_path / name, findings))
-        notes.append(findings.notes)
+        findings = IngestNotes(tmp_path / name)
+        sources.append(read_source(tmp_path / name, notes=findings))
+        notes.append(findings.entries)
     assert len(sources[0].triangles) == 2 * (5 * 2 + 2 - 1) + 2
     assert all(equal(sources[0], other) for other in sources[1:])
     assert notes == [notes[0]] * 4

@@ -7,7 +7,7 @@ import pytest
 
 from ptmtools.arrays import Floats
 from ptmtools.cells.options import WALKER
-from ptmtools.scene.orientation.standing import HEIGHT, NO_ROOMS, RADIUS, Standing
+from ptmtools.scene.orientation.room_sizes import HEIGHT, NO_ROOMS, RADIUS, RoomSizes
 from ptmtools.scene.orientation.up_axis import NamedFaces, evidence
 from tests.scene.buildings import (
     atrium,
@@ -34,11 +34,11 @@ from tests.scene.districts import (
 )
 
 
-def of(triangles: Floats) -> Standing:
+def of(triangles: Floats) -> RoomSizes:
     """With Z up."""
     points, faces = welded(triangles)
     named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
-    return evidence(points, faces, named)["z"].standing
+    return evidence(points, faces, named)["z"].rooms
 
 
 def test_the_visitor_is_the_default_one() -> None:

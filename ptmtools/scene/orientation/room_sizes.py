@@ -73,7 +73,7 @@ def enclosing(lines: SampleLines, crossings: Crossings, axis: int) -> tuple[Ints
 
 
 @dataclass(frozen=True)
-class Standing:
+class RoomSizes:
     """The size of the rooms of a model with one axis up, in units of its points.
 
     Attributes
@@ -100,23 +100,23 @@ class Standing:
         fitting = len(self.visitors) - bisect_left(self.visitors, height)
         return fitting / len(self.visitors) if self.visitors else 1.0
 
-    def times(self, scale: float) -> Standing:
+    def times(self, scale: float) -> RoomSizes:
         """The same in units ``scale`` times as small."""
-        return Standing(
+        return RoomSizes(
             *(tuple(height * scale for height in each) for each in (self.visitors, self.heights))
         )
 
 
-NO_ROOMS = Standing()
+NO_ROOMS = RoomSizes()
 
 
-def standing(
+def room_sizes(
     lines: SampleLines,
     crossings: Sequence[Crossings],
     level: Bools,
     upright: Sequence[Bools],
     axis: int,
-) -> Standing:
+) -> RoomSizes:
     """The size of the rooms with ``axis`` up.
 
     ``crossings`` are those along each axis; ``upright`` is (n,) for each, whether the face crossed
@@ -161,7 +161,7 @@ def standing(
     counted = rooms & roofed
     if volume[counted].sum() < _ROOFED * total:
         counted = rooms
-    return Standing(
+    return RoomSizes(
         _quantiles(body[rooms], volume[rooms]), _quantiles(height[counted], volume[counted])
     )
 
