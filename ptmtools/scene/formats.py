@@ -8,11 +8,11 @@ file of the format is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 from ptmtools import plugins
 from ptmtools.errors import InputError, LimitError, MissingComponentError
@@ -30,27 +30,6 @@ MAX_VERTICES = 2**31 - 1
 Purpose = Literal["lightmap", "reflection"]
 
 
-class ModelReader(Protocol):
-    """Reads a file into triangles in the units and axes of the file.
-
-    Raises InputError for a file that cannot be used; an OSError becomes PTM-I122 and a ValueError
-    PTM-I254, a damaged file. Names of other files are resolved by ``notes``, which also record what
-    is missing or dropped.
-    """
-
-    def __call__(
-        self, model: Path, notes: IngestNotes, options: IngestOptions, progress: Progress, /
-    ) -> ModelSource: ...
-
-
-class SecondReader(Protocol):
-    """Reads a file again with other textures than the colours; None if it names none of these."""
-
-    def __call__(
-        self, model: Path, options: IngestOptions, purpose: Purpose, /
-    ) -> SecondReading | None: ...
-
-
 @dataclass(frozen=True)
 class FileFacts:
     """The version of its format and the program that wrote it, both "" if a file does not state
@@ -59,12 +38,6 @@ class FileFacts:
     version: str = ""
     generator: str = ""
     extensions: Mapping[str, str] = field(default_factory=dict)
-
-
-class FactsReader(Protocol):
-    """Reads what the head of a file states about it."""
-
-    def __call__(self, model: Path, /) -> FileFacts: ...
 
 
 @dataclass(frozen=True)
@@ -76,26 +49,28 @@ class ModelFormat:
     name: the key in the table.
     about: its usual name, for people.
     suffixes: of its files, in lower case, with the dot.
-    reader: reads a file; through `read`, which checks what is common to all formats.
+    reader: reads a file into triangles in its units and axes. An OSError becomes PTM-I122, and a
+        ValueError PTM-I254, a damaged file. The notes resolve the names of other files, and record
+        what is missing or dropped.
     metres, up: the unit and the up axis that it prescribes for all files; None if each file records
         its own (`ModelSource`), or none does.
     usual_up: the up axis by convention, where neither the format nor the file defines one.
     module, install: a library that the reader imports, and how to install it.
     facts: reads the head of a file, for ``ptm info``.
-    second: reads the other textures of its materials.
+    second: reads a file again with other textures than the colours; None if it names none.
     """
 
     name: str
     about: str
     suffixes: tuple[str, ...]
-    reader: Lazy[ModelReader]
+    reader: Lazy[Callable[[Path, IngestNotes, IngestOptions, Progress], ModelSource]]
     metres: float | None = None
     up: Literal["y", "z"] | None = None
     usual_up: Literal["y", "z"] | None = None
     module: str = ""
     install: str = ""
-    facts: Lazy[FactsReader] | None = None
-    second: Lazy[SecondReader] | None = None
+    facts: Lazy[Callable[[Path], FileFacts]] | None = None
+    second: Lazy[Callable[[Path, IngestOptions, Purpose], SecondReading | None]] | None = None
 
     def read(
         self, model: Path, notes: IngestNotes, options: IngestOptions, progress: Progress
@@ -177,8 +152,8 @@ USDZ = replace(USD, name="usdz", about="USDZ", suffixes=(".usdz",))
 
 
 def _of_library(name: str, about: str = "", reader: str = "read_by_pymeshlab") -> ModelFormat:
-    reading = Lazy[ModelReader](f"ptmtools.scene.libraries:{reader}")
-    return ModelFormat(name, about or name.upper(), (f".{name}",), reading)
+    place = f"ptmtools.scene.libraries:{reader}"
+    return ModelFormat(name, about or name.upper(), (f".{name}",), Lazy(place))
 
 
 #: The formats of this package by name.

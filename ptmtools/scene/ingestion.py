@@ -53,15 +53,8 @@ _NO_FILE = {
 
 @dataclass(eq=False)
 class Draft:
-    """A model on its way to a scene: what it is made from, and what each of `STEPS` adds.
-
-    Attributes
-    ----------
-    ask: whether an impossible unit is an error or a note.
-    source: `read_model`. kept: `clean_faces`. space: `find_space`. surfaces: `find_materials`.
-    points, triangles, two_sided: `place_faces`, see `Scene`.
-    lights: `find_lights`. tolerance: `derive_tolerance`.
-    """
+    """A model on its way to a scene. The fields that have no value yet are those of `STEPS`, in
+    their order; ``ask`` as in `ingest`."""
 
     model: Path
     options: IngestOptions

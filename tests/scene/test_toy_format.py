@@ -58,7 +58,7 @@ def test_damage_is_an_error_with_the_file(
 ) -> None:
     wall = tmp_path / "wall.tri"
     wall.write_text("0 0 0 4 0 0 4 0\n")
-    assert main(["info", str(wall)]) == 2
+    assert main(["info", str(wall)]) == 3
     error = capsys.readouterr().err
     assert error.startswith(f"ptm: {wall}: damaged (")
     assert "[PTM-I254]" in error

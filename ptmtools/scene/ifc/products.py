@@ -17,7 +17,6 @@ model or its unpacked content, and replies with the message of `messages.pack_so
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -31,10 +30,26 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.scene.formats import too_many_triangles
-from ptmtools.scene.ifc.entities import FAULTS, has_body, items, name_of, one_line, title_of
-from ptmtools.scene.ifc.spaces import named_rooms, rooms_of
+from ptmtools.scene.ifc.entities import (
+    FAULTS,
+    GLOW,
+    UNSTYLED,
+    has_body,
+    is_drawn,
+    items,
+    kind_of,
+    length_unit,
+    make_rooms,
+    material_of,
+    note_dropped,
+    one_line,
+    rooms_of,
+    shines,
+    storeys,
+    title_of,
+)
 from ptmtools.scene.messages import pack_source
-from ptmtools.scene.model import Kind, RoomVolume, Storey
+from ptmtools.scene.model import RoomVolume
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.sandbox import reply_so_far, serve, unreadable
 from ptmtools.scene.source import MeshArrays, ModelSource, SourceMaterial
@@ -46,13 +61,13 @@ _TRIANGLE = 3
 _FACE, _BREP = "IfcIndexedPolygonalFace", "IfcFacetedBrep"
 
 
-def elements(file: Any, products: list[Any]) -> Iterator[Any]:
+def compute_elements(file: Any, products: list[Any]) -> Iterator[Any]:
     """The shapes of products from the kernels: none, one or several of each, in any order."""
     from ifcopenshell import geom
 
     direct = []
     if hasattr(geom, "has_geometry_library") and geom.has_geometry_library(_DIRECT):
-        direct = [product for product in products if _of_triangles(product)]
+        direct = [product for product in products if _has_triangles_only(product)]
     numbers = {product.id() for product in direct}
     rest = [product for product in products if product.id() not in numbers]
     settings = geom.settings()
@@ -65,11 +80,11 @@ def elements(file: Any, products: list[Any]) -> Iterator[Any]:
             )
 
 
-def _of_triangles(product: Any) -> bool:
+def _has_triangles_only(product: Any) -> bool:
     """Whether a product consists of triangles only."""
     try:
-        every = product.Representation.Representations or ()
-        return all(_is_triangles(item) for one in every for item in items(one))
+        shapes = product.Representation.Representations or ()
+        return all(_is_triangles(item) for shape in shapes for item in items(shape))
     except FAULTS:
         return False
 
@@ -140,7 +155,7 @@ def read_products(
         materials=tuple(numbers),
         metres=None if metres is None else 1.0,
         up="z",
-        kinds=tuple(_kind(shape.product) for shape in shapes),
+        kinds=tuple(kind_of(shape.product) for shape in shapes),
         storeys=storeys(file, metres or 1.0),
     )
     if spaces := rooms_of(file, notes):
@@ -154,22 +169,15 @@ def _rooms(file: Any, spaces: list[Any], notes: IngestNotes) -> tuple[RoomVolume
     meshes: dict[int, tuple[Floats, Ints]] = {}
     ranks: dict[int, tuple[bool, str]] = {}
     with suppress(*FAULTS):
-        for element in elements(file, spaces):
+        for element in compute_elements(file, spaces):
             rank = _rank(element)
             if element.id not in ranks or rank < ranks[element.id]:
                 shape = _shape(file, element)
                 ranks[element.id] = rank
                 meshes[element.id] = shape.points, shape.triangles
-    for _ in _errors():  # of spaces, which `named_rooms` notes
+    for _ in _errors():  # of spaces, which `make_rooms` notes
         pass
-    return named_rooms(spaces, meshes, notes)
-
-
-def _kind(product: Any) -> Kind:
-    if product.is_a(_PART):
-        for relation in product.Decomposes:
-            return kind_of(relation.RelatingObject.is_a)
-    return kind_of(product.is_a)
+    return make_rooms(spaces, meshes, notes)
 
 
 def _drawn_products(file: Any, notes: IngestNotes) -> list[Any]:
@@ -178,7 +186,7 @@ def _drawn_products(file: Any, notes: IngestNotes) -> list[Any]:
     for product in sorted(file.by_type("IfcProduct"), key=lambda product: int(product.id())):
         if product.Representation is None:
             continue
-        if not drawn(product.is_a):
+        if not is_drawn(product):
             hidden[product.is_a()] += 1
         elif not has_body(product):
             notes.note("PTM-N215", f"{product.is_a()}: lines without a surface")
@@ -189,34 +197,34 @@ def _drawn_products(file: Any, notes: IngestNotes) -> list[Any]:
     return result
 
 
-def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[ProductShape]:
+def _shapes(file: Any, products: list[Any], limit: int, model: Path) -> list[ProductShape]:
     """The preferred shape of each product that has any, in the order of their numbers."""
     best: dict[int, tuple[tuple[bool, str], ProductShape]] = {}
     count = 0
-    for element in elements(file, products):
+    for element in compute_elements(file, products):
         shape = _shape(file, element)
         size = len(shape.triangles)
         if not size:
             continue
         rank = _rank(element)
         if element.id in best:
-            other, replaced = best[element.id]
-            if other <= rank:
+            best_rank, replaced = best[element.id]
+            if best_rank <= rank:
                 continue
             count -= len(replaced.triangles)
         count += size
-        if count > most:
-            raise too_many_triangles(most, model)
+        if count > limit:
+            raise too_many_triangles(limit, model)
         best[element.id] = rank, shape
     return [shape for _, (_, shape) in sorted(best.items())]
 
 
 def _rank(element: Any) -> tuple[bool, str]:
     """Of several shapes of a product the one of the least rank counts."""
-    return element.context != _BODY, _padded(element.geometry.id)
+    return element.context != _BODY, _sorting_name(element.geometry.id)
 
 
-def _padded(name: str) -> str:
+def _sorting_name(name: str) -> str:
     """A name that begins with a number, padded so that names sort by number."""
     number, *rest = name.split("-")
     return f"{number:>12}-{rest}"
@@ -228,9 +236,9 @@ def _shape(file: Any, element: Any) -> ProductShape:
     placed = np.array(element.transformation.matrix, dtype=np.float64).reshape(4, 4).T
     local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
     triangles = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3)
-    style = np.frombuffer(geometry.material_ids_buffer, dtype=np.int32)  # -1 for none
+    number = np.frombuffer(geometry.material_ids_buffer, dtype=np.int32)  # -1 for none
     product = file.by_id(element.id)
-    materials = UNSTYLED, *(material_of(file, one) for one in geometry.materials)
+    materials = UNSTYLED, *(material_of(file, style) for style in geometry.materials)
     if shines(product):
         materials = tuple(replace(material, glow=GLOW) for material in materials)
     return ProductShape(
@@ -238,7 +246,7 @@ def _shape(file: Any, element: Any) -> ProductShape:
         local @ placed[:3, :3].T + placed[:3, 3],
         triangles.astype(np.int64),
         materials,
-        style.astype(np.int64) + 1,
+        number.astype(np.int64) + 1,
     )
 
 
@@ -269,163 +277,7 @@ def _errors() -> Iterator[tuple[str, str]]:
             yield logged["guid"] or "", one_line(logged["text"])
 
 
-# Roles by class, names, the unit, storeys and materials. A class in the tables includes its
-# subclasses, in IFC2X3, IFC4 and IFC4X3; the first matching row decides. The tables omit classes
-# whose role follows from the shape: an opaque face of a column, a beam, a plate of a curtain wall,
-# a suspended ceiling or the ground divides the building if it is large enough, and need not divide
-# it otherwise. As structure, each of the 32 sides of a round column would divide the hall.
-
-#: Drawn although its superclass is not, because it contains the ground.
-_GROUND = "IfcSite"
-#: Invisible products: spaces, openings, drawings and analysis models.
-_NOT_DRAWN = """
-    IfcSpatialElement IfcSpatialStructureElement IfcFeatureElementSubtraction IfcVirtualElement
-    IfcAnnotation IfcGrid IfcPositioningElement IfcLinearElement IfcPort IfcStructuralActivity
-    IfcStructuralItem
-"""
-#: Roles by class. A building element part has the kind of its whole, such as the wall of a layer. A
-#: window is detail because a pane without a style is opaque, but not meant to block sight.
-_KINDS: tuple[tuple[Kind, str], ...] = (
-    ("door", "IfcDoor"),
-    ("structural", "IfcWall IfcSlab IfcRoof IfcStair IfcStairFlight IfcRamp IfcRampFlight"),
-    ("", "IfcBuildingElementPart"),
-    (
-        "detail",
-        """IfcWindow IfcRailing IfcFurnishingElement IfcDistributionElement IfcElectricalElement
-        IfcEquipmentElement IfcElementComponent IfcReinforcingElement IfcShadingDevice
-        IfcSurfaceFeature""",
-    ),
-)
-#: Their surfaces glow, housings included: files seldom tell these apart. The luminance has no
-#: effect, if it is that of all lamps (`ptmtools.light.lamps`).
-_LAMPS, GLOW = ("IfcLightFixture", "IfcLamp"), 1.0
-_PART, _STOREY = "IfcBuildingElementPart", "IfcBuildingStorey"
-
-
-def drawn(is_a: Callable[[str], bool]) -> bool:
-    """Whether products of a class are drawn; ``is_a`` tests for a class or its subclasses."""
-    return is_a(_GROUND) or not any(map(is_a, _NOT_DRAWN.split()))
-
-
-def kind_of(is_a: Callable[[str], bool]) -> Kind:
-    """The role of products of a class."""
-    return next((kind for kind, classes in _KINDS if any(map(is_a, classes.split()))), "")
-
-
-def shines(product: Any) -> bool:
-    """Whether a product is a lamp or a light fixture, by its class or, in IFC2X3, by its type."""
-    if any(map(product.is_a, _LAMPS)):
-        return True
-    with suppress(*FAULTS):
-        for relation in product.IsDefinedBy:
-            if relation.is_a("IfcRelDefinesByType"):
-                return any(relation.RelatingType.is_a(f"{name}Type") for name in _LAMPS)
-    return False
-
-
-def length_unit(file: Any) -> tuple[str, float | None]:
-    """The name of the file's unit of length and its length in metres; None without a unit."""
-    from ifcopenshell.util import unit
-
-    for context in file.by_type("IfcUnitAssignment"):
-        for one in context.Units or ():
-            if getattr(one, "UnitType", None) == "LENGTHUNIT":
-                prefix = getattr(one, "Prefix", None) or ""
-                name = f"{prefix}{name_of(one)}".lower()
-                return name, float(unit.calculate_unit_scale(file))
-    return "", None
-
-
-def storeys(file: Any, metres: float) -> tuple[Storey, ...]:
-    """The storeys with a name and a height, in metres along z."""
-    every = ((s, name_of(s) or one_line(s.LongName or "")) for s in file.by_type(_STOREY))
-    named = [(storey, name) for storey, name in every if name]
-    placed = [_placement(storey) for storey, _ in named]
-    stated = [_elevation(storey) for storey, _ in named]
-    # Products are placed relative to the placement of their storey; the elevation is often that
-    # above sea level. But some exporters place everything at 0, storeys included.
-    if len(set(placed)) == 1 < len(set(stated)):
-        placed = [None] * len(named)
-    return tuple(
-        Storey(name, height * metres)
-        for (_, name), at, elevation in zip(named, placed, stated, strict=True)
-        if (height := elevation if at is None else at) is not None and math.isfinite(height)
-    )
-
-
-def _placement(product: Any) -> float | None:
-    """The height of a product's placement, in the file's unit; None without one."""
-    from ifcopenshell.util import placement
-
-    if product.ObjectPlacement is None:
-        return None
-    try:
-        return float(placement.get_local_placement(product.ObjectPlacement)[2][3])
-    except FAULTS:
-        return None
-
-
-def _elevation(storey: Any) -> float | None:
-    """A storey's elevation, which is relative to its building, in the file's unit."""
-    if storey.Elevation is None:
-        return None
-    building = next((whole for whole in _wholes(storey) if whole.is_a("IfcBuilding")), None)
-    ground = 0.0 if building is None else _placement(building) or 0.0
-    return ground + float(storey.Elevation)
-
-
-def _wholes(product: Any) -> Iterator[Any]:
-    """The product that this one is a part of, and so on."""
-    seen = set()
-    while product.id() not in seen:
-        seen.add(product.id())
-        for relation in product.Decomposes:
-            product = relation.RelatingObject
-            yield product
-            break
-
-
-#: The material of surfaces without a style.
-UNSTYLED = SourceMaterial("default")
-_DROPPED = (
-    ("IfcSurfaceTexture", "textures dropped"),
-    ("IfcIndexedColourMap", "colours of single faces dropped"),  # not in IFC2X3
-)
-
-
-def material_of(file: Any, style: Any) -> SourceMaterial:
-    """The material of a style of the geometry kernel. Materials of equal name and appearance are
-    equal, because programs write the same style thousands of times."""
-    tint = [style.diffuse.r(), style.diffuse.g(), style.diffuse.b()]
-    color = None
-    if np.isfinite(tint).all():
-        red, green, blue = np.clip(tint, 0, 1).tolist()
-        color = red, green, blue
-    opacity = 1.0
-    if style.has_transparency() and np.isfinite(style.transparency):
-        opacity = 1.0 - float(np.clip(style.transparency, 0, 1))
-    number = style.instance_id()  # of the style, or of its material
-    name = name_of(file.by_id(number)) if number else ""
-    return SourceMaterial(name or _shade(color), color, opacity)
-
-
-def note_dropped(file: Any, notes: IngestNotes) -> None:
-    """Notes the unsupported properties of surfaces."""
-    for name, message in _DROPPED:
-        try:
-            count = len(file.by_type(name))
-        except RuntimeError:  # not a class of this schema
-            continue
-        if count:
-            notes.note("PTM-N215", message, "", count)
-
-
-def _shade(color: tuple[float, float, float] | None) -> str:
-    """The name of an unnamed style."""
-    return "#" + "".join(f"{round(255 * part):02x}" for part in color) if color else UNSTYLED.name
-
-
-def _open(path: str, notes: IngestNotes) -> Any:
+def _open_file(path: str, notes: IngestNotes) -> Any:
     """Raises InputError PTM-I243 for an unknown schema, PTM-I254 for other errors."""
     import ifcopenshell as library
 
@@ -444,7 +296,7 @@ def _open(path: str, notes: IngestNotes) -> Any:
     return file
 
 
-def _read_in_child(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
+def _read_in_child(scratch: str, model: str, path: str, triangles: str) -> dict[str, Any]:
     notes = IngestNotes(Path(model))
 
     def reply_without_rooms(source: ModelSource, spaces: int) -> None:
@@ -453,7 +305,7 @@ def _read_in_child(scratch: str, model: str, path: str, most: str) -> dict[str, 
         without.note("PTM-N215", "IfcSpace: no room (IfcOpenShell fails on them)", "", spaces)
         reply_so_far(pack_source(source, {}, without, scratch))
 
-    source = read_products(_open(path, notes), notes, int(most), reply_without_rooms)
+    source = read_products(_open_file(path, notes), notes, int(triangles), reply_without_rooms)
     return pack_source(source, {}, notes, scratch)
 
 

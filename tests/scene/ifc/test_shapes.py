@@ -83,13 +83,13 @@ def test_the_order_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.Monke
     import ifcopenshell as library
 
     path = house(Ifc()).write(tmp_path / "house.ifc")
-    plain = ifc_products.elements
+    plain = ifc_products.compute_elements
 
     def backwards(file: Any, products: list[Any]) -> Iterator[Any]:
         for product in reversed(products):
             yield from plain(file, [product])
 
-    monkeypatch.setattr(ifc_products, "elements", backwards)
+    monkeypatch.setattr(ifc_products, "compute_elements", backwards)
     findings = IngestNotes(path)
     turned = ifc_products.read_products(library.open(str(path)), findings, MAX_VERTICES)
     for name, value in vars(read(path)[0]).items():

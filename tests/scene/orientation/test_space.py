@@ -44,13 +44,13 @@ def test_each_unit_can_be_guessed_or_given() -> None:
     assert list(UNITS) == ["m", "cm", "mm", "in", "ft"]
 
 
-NOTHING = DeclaredSpace()
+NOTHING, OBJ = DeclaredSpace(), DeclaredSpace(usual_up="y")
 
 
 def settled(
     triangles: Floats,
     by_user: DeclaredSpace = NOTHING,
-    by_format: DeclaredSpace = NOTHING,
+    by_format: DeclaredSpace = OBJ,
 ) -> tuple[Space, dict]:
     """The space of triangles, and the notes on it by code."""
     points, faces = welded(triangles)
@@ -166,7 +166,7 @@ def of_extent(triangles: Floats, extent: float) -> Floats:
 
 
 @pytest.mark.parametrize("name", BUILDINGS)
-@pytest.mark.parametrize("by_format", [NOTHING, GLTF], ids=["obj", "gltf"])
+@pytest.mark.parametrize("by_format", [OBJ, GLTF], ids=["obj", "gltf"])
 def test_the_unit_of_a_model_of_extent_3_is_asked(name: str, by_format: DeclaredSpace) -> None:
     """Each of the three units is an option, in the first of which the rooms are 2 to 6 m high."""
     small = y_up(of_extent(BUILDINGS[name], 2.9))
@@ -192,11 +192,10 @@ def _width(triangles: Floats) -> float:
 
 def test_without_asking_an_impossible_unit_is_noted() -> None:
     points, faces = welded(y_up(of_extent(house(), 1)))
-    for by_format in (NOTHING, GLTF):
+    for by_format in (OBJ, GLTF):
         findings = IngestNotes(Path("house.obj"))
         named = NamedFaces(*np.zeros((2, len(faces)), dtype=bool))
-        model = Path("house.obj")
-        space = settle(model, points, faces, named, NOTHING, by_format, findings, ask=False)
+        space = settle(points, faces, named, NOTHING, by_format, findings, ask=False)
         assert (space.metres, space.up) == (1.0, "y")
         assert {n.code for n in findings.entries} - {"PTM-N202", "PTM-N238"} == {"PTM-N236"}
 
