@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ptmtools.lazy import Lazy
@@ -12,6 +13,23 @@ from ptmtools.lazy import Lazy
 GZIP = ".gz"
 #: Path in the served folder, and its text or bytes.
 File = tuple[str, str | bytes]
+
+
+@dataclass(frozen=True)
+class SiteTextures:
+    """How a site has the textures of an emitter with `Emitter.texture_files`.
+
+    Attributes
+    ----------
+    member: of the site's index, with the URL of the document that describes them.
+    folder: of their files in the site.
+    entries: function from (index of the hints, function from a URL of it to the file and its
+        SHA-256) to the files, the document last.
+    """
+
+    member: str
+    folder: str
+    entries: Lazy[Callable[[Mapping[str, Any], Callable[[str], tuple[Path, str]]], Iterable[Any]]]
 
 
 @dataclass(frozen=True)
@@ -30,6 +48,7 @@ class Emitter:
     has_meshes: whether finer meshes of objects are files of their own (`names.mesh_path`).
     texture_files: template of the folders of the textures' files, if it has a texture form of its
         own (`names.texture_name`).
+    site: how a site has these; None if it leaves them out.
     writer: function from a `Content` to the files, in the order of writing. The call itself,
         before the first file, raises the refusals of the form.
     reader: function from (path in the served folder, bytes) of one file to its content for
@@ -48,6 +67,7 @@ class Emitter:
     cell_files: str = ""
     has_meshes: bool = False
     texture_files: str = ""
+    site: SiteTextures | None = None
 
     def is_owner(self, path: str) -> bool:
         """Whether a path in the served folder, or that of a gzip copy, belongs to the form."""

@@ -1,22 +1,25 @@
 """The table of emitters, the forms in which a database is served.
 
 Options, writing, validation and the command line go by the table, and nothing else branches on a
-name: a new form is a file with its functions and a declaration here.
+name: a new form is a file with its functions and a declaration here, or an entry point of the group
+``ptmtools.emitters`` in another package.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ptmtools import plugins
 from ptmtools.lazy import Lazy
 from ptmtools.output import names
-from ptmtools.output.emitter import Emitter
+from ptmtools.output.emitter import Emitter, SiteTextures
 from ptmtools.output.names import (
     CELL_FOLDER,
     GLTF_FILES,
     GLTF_FOLDER,
     HINTS,
     HINTS_FOLDER,
-    INTERLACE_FILES,
-    INTERLACE_FOLDER,
     ROOT,
     VRML_FILES,
 )
@@ -30,15 +33,6 @@ GLTF = Emitter(
     check=Lazy("ptmtools.output.validation.gltf:check_files"),
     cell_files=GLTF_FILES,
     has_meshes=True,
-)
-INTERLACE = Emitter(
-    name=names.INTERLACE,
-    about="an interlaced image of each texture, in interlace/",
-    owns=(f"{INTERLACE_FOLDER}/",),
-    writer=Lazy("ptmtools.output.interlacing:interlaced_files"),
-    reader=Lazy("ptmtools.output.interlacing:read_file"),
-    check=Lazy("ptmtools.output.interlacing:check_files"),
-    texture_files=INTERLACE_FILES,
 )
 VRML = Emitter(
     name=names.VRML,
@@ -61,7 +55,10 @@ _HINTS = Emitter(
 )
 
 #: The names of `--format`, in the order of writing.
-EMITTERS: dict[str, Emitter] = {emitter.name: emitter for emitter in (VRML, GLTF, INTERLACE)}
+EMITTERS: dict[str, Emitter] = {
+    emitter.name: emitter
+    for emitter in (VRML, GLTF, *plugins.declared("emitters", Emitter).values())
+}
 #: Written after the chosen ones, with every choice.
 _ALWAYS = (_HINTS,)
 
@@ -86,3 +83,16 @@ def chosen_emitters(format: str) -> tuple[Emitter, ...]:
 def owner_of(path: str) -> Emitter | None:
     """The emitter that a path in the served folder belongs to, or None."""
     return next((emitter for emitter in all_emitters() if emitter.is_owner(path)), None)
+
+
+def texture_forms(index: Mapping[str, Any]) -> Iterator[SiteTextures]:
+    """The forms of textures that an index of the hints names, and a site has."""
+    for emitter in EMITTERS.values():
+        if emitter.site and emitter.name in index.get("textureSets", {}):
+            yield emitter.site
+
+
+def is_other_form(name: str) -> bool:
+    """Whether a file of a site is a texture in one of these forms, which few visits need."""
+    forms = (emitter.site for emitter in EMITTERS.values() if emitter.site)
+    return any(name.startswith(f"{form.folder}/") for form in forms)

@@ -11,7 +11,7 @@ import unicodedata
 from pathlib import PurePosixPath
 
 #: Forms of the served files, in `--format` and in the index of the hints.
-VRML, GLTF, INTERLACE = "vrml", "gltf", "interlace"
+VRML, GLTF = "vrml", "gltf"
 #: In the served folder.
 ROOT = "root.wrl"
 HINTS = "hints.json"
@@ -20,7 +20,6 @@ STATISTICS = f"{HINTS_FOLDER}/statistics.json"
 CELL_FOLDER = "cells"
 TEXTURE_FOLDER = "textures"
 GLTF_FOLDER = "gltf"
-INTERLACE_FOLDER = "interlace"
 #: From one of these folders back to the served one.
 UP = "../"
 #: The files of a cell, as the index names them: URI templates (RFC 6570, level 1).
@@ -29,8 +28,6 @@ BUNDLE = ".bin"
 FIRST_LOOK_FILES = f"{HINTS_FOLDER}/{{name}}{BUNDLE}"
 VRML_FILES = f"{CELL_FOLDER}/{{name}}.wrl"
 GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
-#: The folder of a texture's interlaced set likewise.
-INTERLACE_FILES = f"{INTERLACE_FOLDER}/{{name}}/"
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 #: Longer object names are cut: they come from generators and carry no more information.

@@ -56,12 +56,12 @@ class ObjectMaps:
     def painted(self, scene: Scene) -> Scene:
         """The scene as changed; of it, each of these objects has its normal map for an image,
         numbered as in `objects`, and other surfaces have none."""
-        own = np.isin(scene.triangle_object, self.objects)
-        uv = np.zeros((len(own), 3, 2))
-        uv[own] = self.uv
+        mapped = np.isin(scene.triangle_object, self.objects)
+        uv = np.zeros((len(mapped), 3, 2))
+        uv[mapped] = self.uv
         count = len(scene.materials)
-        first = np.zeros(len(own), np.int64)
-        first[own] = count * (1 + np.searchsorted(self.objects, scene.triangle_object[own]))
+        first = np.zeros(len(mapped), np.int64)
+        first[mapped] = count * (1 + np.searchsorted(self.objects, scene.triangle_object[mapped]))
         return replace(
             scene,
             uv=uv,

@@ -11,30 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ptmtools import plugins
 from ptmtools.lazy import Lazy
 
 if TYPE_CHECKING:
-    from ptmtools.arrays import Bools, Floats
     from ptmtools.output.model import TextureRecord
     from ptmtools.output.object_maps import ObjectMaps
     from ptmtools.output.served import Served
-    from ptmtools.rendering.records import Sight, Triangles
 
 #: A row of a list in the index of the hints.
 Row = Mapping[str, Any]
-
-
-class ObjectPainter(Protocol):
-    """Draws the objects of a database that have a representation, in views lit by a lamp."""
-
-    def paint(
-        self, sight: Sight, triangles: Triangles, lamps: Floats, loaded: Bools, shown: Floats
-    ) -> None:
-        """Lights the pixels ``shown`` (n, 3) of these objects instead of the ``lamps`` (m,) on
-        their faces; ``loaded`` (C,): the cells that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +37,8 @@ class Representation:
     folder: of its files in the served folder.
     script: of the page that draws it.
     check: function that checks the rows in ``hints`` and their files in a served database.
-    painter: opens the painter of a served database that has such a list.
+    painter: opens the painter of a served database that has such a list, an `ObjectPainter` of
+        `ptmtools.rendering.painting`.
     published: from a served database and the file and SHA-256 of a URL to the rows of a site's
         index, each with its file.
     warm_up: calls the compiled kernels that making and drawing it need.
@@ -61,7 +50,7 @@ class Representation:
     folder: str
     script: str
     check: Lazy[Callable[[Any, Any], None]]
-    painter: Lazy[Callable[[Served], ObjectPainter]]
+    painter: Lazy[Callable[[Served], Any]]
     published: Lazy[
         Callable[[Served, Callable[[str], tuple[Path, str]]], Iterable[tuple[Row, Path, str]]]
     ]

@@ -5,10 +5,12 @@ The pictures of sites have a painter of their own, without compiled code (`ptmto
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.output.representation import listed
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
@@ -21,6 +23,16 @@ from ptmtools.rendering.previews import Texels
 from ptmtools.rendering.pyramids import alpha_of, read_levels, read_pyramids
 from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels, triangles_of
 from ptmtools.scene.colors import to_srgb
+
+
+class ObjectPainter(Protocol):
+    """Draws the objects of a database that have a representation, in views lit by a lamp."""
+
+    def paint(
+        self, sight: Sight, triangles: Triangles, lamps: Floats, loaded: Bools, shown: Floats
+    ) -> None:
+        """Lights the pixels ``shown`` (n, 3) of these objects instead of the ``lamps`` (m,) on
+        their faces; ``loaded`` (C,): the cells that are drawn."""
 
 
 class Painter:
@@ -82,7 +94,9 @@ class Painter:
         if self._lit:
             self._lamps = lamps(self._surfaces.corner)
             kinds = listed(self._served.index)
-            self._painters = [kind.painter.load()(self._served) for kind in kinds]
+            self._painters: list[ObjectPainter] = [
+                kind.painter.load()(self._served) for kind in kinds
+            ]
 
     def colors(self, sight: Sight) -> Floats:
         """(n, 3) colours of pixels, 0 to 255; of the sky where they show nothing."""

@@ -23,6 +23,8 @@ from ptmtools.errors import DatabaseError, InputError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.options import option
 from ptmtools.output.emission import compressed
+from ptmtools.output.emitter import SiteTextures
+from ptmtools.output.emitters import is_other_form, texture_forms
 from ptmtools.output.model import FileError
 from ptmtools.output.representation import Representation, listed
 from ptmtools.output.served import FORM, Served, read_served
@@ -33,7 +35,6 @@ from ptmtools.site.entry import Entry
 from ptmtools.site.files import DATA, Files
 from ptmtools.site.front import Front
 from ptmtools.site.geometry import lean_glb
-from ptmtools.site.sets import has_sets, is_of_sets, set_entries
 from ptmtools.site.textures import web_texture, without_exact
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
@@ -183,8 +184,8 @@ class _Builder:
         for kind in listed(index):
             index[kind.name] = list(self._represented(kind))
         index["textures"] = list(self._textures())
-        if has_sets(self._served.index):
-            index["sets"] = self._sets()
+        for form in texture_forms(self._served.index):
+            index[form.member] = self._texture_form(form)
         index["viewpoints"], poster = self._pictures()
         openings = self._openings(index) if self._options.opening else ()
         if self._options.clients == "vrml":
@@ -224,7 +225,7 @@ class _Builder:
                 url = index["cells"][number][kind]
             return self._files.entries[f"{DATA}/{url}"].read(end)
 
-        entries = (entry for entry in self._files.entries.values() if not is_of_sets(entry.name))
+        entries = (entry for entry in self._files.entries.values() if not is_other_form(entry.name))
         size = sum(entry.state[2] if entry.state else len(entry.read()) for entry in entries)
         try:
             data = list(openings_of(self._served, index, read, size))
@@ -260,9 +261,9 @@ class _Builder:
         for row, file, digest in kind.published.load()(self._served, self._place):
             yield {**row, "file": self._files.add(file.stem, ".bin", PTM, file, digest=digest)}
 
-    def _sets(self) -> str:
-        """The URL of the document of all interlaced images."""
-        entries = list(set_entries(self._served.index, self._place))
+    def _texture_form(self, form: SiteTextures) -> str:
+        """The URL of the document of the textures in another form."""
+        entries: list[Entry] = [*form.entries.load()(self._served.index, self._place)]
         self._files.entries |= {entry.name: entry for entry in entries}
         return entries[-1].name.removeprefix(f"{DATA}/")
 

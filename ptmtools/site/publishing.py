@@ -30,6 +30,7 @@ from ptmtools.files import (
     write_with,
     writing,
 )
+from ptmtools.output.emitters import is_other_form
 from ptmtools.output.representation import listed
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import Site
@@ -47,7 +48,6 @@ from ptmtools.site.published import (
     steps_of,
     steps_of_removal,
 )
-from ptmtools.site.sets import is_of_sets
 from ptmtools.site.uploading import upload
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
@@ -250,7 +250,7 @@ def weight_of(site: Site) -> Weight:
 def _walked(name: str, used: Collection[str]) -> bool:
     """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
     script = name.rpartition("/")[2]
-    later = (script in LATER and script not in used) or is_of_sets(name)
+    later = (script in LATER and script not in used) or is_other_form(name)
     walked = name.startswith(("viewer-", f"{DATA}/")) and not name.startswith(_NOT_OF_WALK)
     return name == INDEX or (walked and not later)
 

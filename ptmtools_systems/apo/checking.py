@@ -18,6 +18,7 @@ from ptmtools.output.names import HINTS
 from ptmtools.output.validation.files import ReadHints, ServedDatabase
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
+from ptmtools_systems.apo.declarations import OCTREES
 from ptmtools_systems.apo.files import (
     COLORS,
     INDEX,
@@ -33,7 +34,6 @@ from ptmtools_systems.apo.files import (
 )
 from ptmtools_systems.apo.model import ADDRESS_BITS, Octree
 from ptmtools_systems.apo.octree import fault_of
-from ptmtools_systems.entries import OCTREES
 
 #: Texels of an octree take less than this many bytes, however they are deflated: the texels are
 #: fewer than the addresses.

@@ -95,22 +95,21 @@ def relieve(
     lamps: Floats,
     octrees: Octrees,
     loaded: Bools,
-    held: Ints,
+    loaded_levels: Ints,
     shown: Floats,
 ) -> None:
-    """Lights the pixels ``shown`` (n, 3) by the loaded levels ``held`` (O,) of the octrees; pixels
-    without an octree keep their colours. ``loaded`` (C,): whether the geometry of a cell is
-    loaded."""
+    """Lights the pixels ``shown`` (n, 3) by the ``loaded_levels`` (O,) of the octrees; pixels
+    without an octree keep their colours. ``loaded`` (C,): the cells whose geometry is loaded."""
     light = np.zeros(DEEP)
     for i in range(len(shown)):
         f = sight.triangle[i]
         if f < 0 or not loaded[triangles.cell[f]]:
             continue
         o = octrees.of[f]
-        if o < 0 or held[o] == 0:
+        if o < 0 or loaded_levels[o] == 0:
             continue
         depth, ray = depth_of(sight, i, triangles), sight.ray[i]
-        stop = min(stop_of(sight, i, triangles, depth, octrees.side[o]), held[o] - 1)
+        stop = min(stop_of(sight, i, triangles, depth, octrees.side[o]), loaded_levels[o] - 1)
         place = depth * ray + sight.eye
         count = descend(octrees, o, place[0], place[1], place[2], stop, light)
         for k in range(3):

@@ -17,8 +17,8 @@ from ptmtools.output.names import HINTS
 from ptmtools.output.served import BUILD, Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.records import Sight, Triangles
+from ptmtools_systems.apo.declarations import OCTREES
 from ptmtools_systems.apo.files import inflated
-from ptmtools_systems.entries import OCTREES
 
 #: Number of points of each object at which the levels of its octree are compared, and the seed of
 #: their places.
@@ -79,11 +79,9 @@ def read_octrees(served: Served) -> Octrees:
 
 def no_octrees(surfaces: Surfaces) -> Octrees:
     """An empty set of octrees."""
-    of = np.full(len(surfaces.corner), -1, np.int32)
-    no = np.zeros(0, np.int64)
-    return Octrees(
-        np.zeros((0, 4), np.uint8), np.zeros(1, np.int64), no, np.zeros((0, 3)), np.zeros(0), of
-    )
+    numbers = np.full(len(surfaces.corner), -1, np.int32)
+    none, no_texels = np.zeros(0, np.int64), np.zeros((0, 4), np.uint8)
+    return Octrees(no_texels, np.zeros(1, np.int64), none, np.zeros((0, 3)), np.zeros(0), numbers)
 
 
 def _rows(served: Served) -> Sequence[Mapping[str, Any]]:
@@ -122,14 +120,14 @@ def level_differences(surfaces: Surfaces, octrees: Octrees) -> Floats:
     steps = np.zeros((octrees.number, int(octrees.levels.max(initial=0))))
     random = np.random.default_rng(_SEED)
     for o in range(octrees.number):
-        own = np.flatnonzero(octrees.of == o)
-        if not len(own):
+        faces = np.flatnonzero(octrees.of == o)
+        if not len(faces):
             continue
-        corner = surfaces.corner[own]
+        corner = surfaces.corner[faces]
         total = np.cumsum(areas(corner))
         which = np.searchsorted(total, random.uniform(0, total[-1], _POINTS), "right")
         weight = random.dirichlet(np.ones(3), _POINTS)
-        place = np.einsum("nk,nkj->nj", weight, corner[np.minimum(which, len(own) - 1)])
+        place = np.einsum("nk,nkj->nj", weight, corner[np.minimum(which, len(faces) - 1)])
         light = np.zeros(DEEP)
         for x, y, z in place.tolist():
             count = descend(octrees, o, x, y, z, DEEP, light)
@@ -138,7 +136,8 @@ def level_differences(surfaces: Surfaces, octrees: Octrees) -> Floats:
 
 
 class OctreePainter:
-    """Lights objects by their octree textures, see `representation.ObjectPainter`."""
+    """Lights objects by their octree textures, see `ObjectPainter` of
+    `ptmtools.rendering.painting`."""
 
     def __init__(self, served: Served) -> None:
         """Raises as `read_octrees`."""

@@ -24,8 +24,8 @@ from ptmtools.pipeline.stage import Artifacts, Job, Run, SceneOrigin, Stage, des
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED, STAGES_FOLDER, arrays_of
+from ptmtools_systems.apo.declarations import OCTREES
 from ptmtools_systems.apo.options import ReplaceOptions
-from ptmtools_systems.entries import OCTREES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -89,10 +89,10 @@ class ReplacingJob(Job):
         run = self.run
         result = replaced(run.original(SCENE), self.options, run.workers.executor, run.progress)
         rows = []
-        files = octree_files(each.name for each in result.objects)
-        for file, each in zip(files, result.objects, strict=True):
-            if each.octree is not None:
-                row, data = _row(file, each, each.octree)
+        files = octree_files(thing.name for thing in result.objects)
+        for file, thing in zip(files, result.objects, strict=True):
+            if thing.octree is not None:
+                row, data = _row(file, thing, thing.octree)
                 rows.append(row)
                 transaction.put(f"{SERVED}/{file}", data)
         if result.replacement:
@@ -105,12 +105,12 @@ class ReplacingJob(Job):
         counts = {
             "octrees": len(rows),
             "objects": len(result.objects),
-            "source": sum(each.source for each in result.objects),
-            "faces": sum(each.faces for each in result.objects),
+            "source": sum(thing.source for thing in result.objects),
+            "faces": sum(thing.faces for thing in result.objects),
             "texels": sum(sum(row["levels"]) for row in rows),
             "bytes": sum(row["ends"][-1] for row in rows),
             "triangles": len(result.scene.triangles),
-            "deviation": max((each.deviation for each in result.objects), default=0.0),
+            "deviation": max((thing.deviation for thing in result.objects), default=0.0),
         }
         return described(work, counts, result.notes)
 

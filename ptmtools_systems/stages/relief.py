@@ -141,8 +141,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 def _fits_scene(reliefs: ObjectMaps, scene: Scene) -> str:
     import numpy as np
 
-    own = np.isin(scene.triangle_object, reliefs.objects).sum()
-    return "" if own == len(reliefs.uv) else "the normal maps are those of other objects"
+    mapped = np.isin(scene.triangle_object, reliefs.objects).sum()
+    return "" if mapped == len(reliefs.uv) else "the normal maps are those of other objects"
 
 
 RELIEF: Stage[ObjectMaps] = Stage(

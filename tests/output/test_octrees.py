@@ -15,8 +15,8 @@ import pytest
 from ptmtools.output import EmitOptions, emit, validate_database
 from ptmtools.output.names import HINTS
 from ptmtools.output.representation import Represented
+from ptmtools_systems.apo.declarations import OCTREES
 from ptmtools_systems.apo.files import streamed
-from ptmtools_systems.entries import OCTREES
 from ptmtools_systems.stages.apo import OctreeRecord
 from tests.output.agreement import disagreements
 from tests.output.damage import (

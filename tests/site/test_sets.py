@@ -17,13 +17,13 @@ import pytest
 
 from ptmtools.errors import DatabaseError
 from ptmtools.link import Conditions
+from ptmtools.output.emitters import is_other_form
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry, is_marked
 from ptmtools.site.publishing import weight_of
 from ptmtools.site.serving import serving
-from ptmtools.site.sets import is_of_sets
 from ptmtools.site.throttle import Throttle
 from ptmtools.walk import parse_walk
 from ptmtools_lab.policies import POLICIES
@@ -176,9 +176,9 @@ def test_who_does_not_ask_loads_nothing(visit: Visiting, hall: Site) -> None:
         visitor.complete()
         paths = [v.path for v in visitor.visits]
     assert [path for path in paths if "sets" in path] == []
-    without = {name: entry for name, entry in hall.entries.items() if not is_of_sets(name)}
+    without = {name: entry for name, entry in hall.entries.items() if not is_other_form(name)}
     assert weight_of(hall) == weight_of(replace(hall, entries=without))
-    assert all(is_marked(name) for name in hall.entries if is_of_sets(name))
+    assert all(is_marked(name) for name in hall.entries if is_other_form(name))
 
 
 def test_other_policies_are_refused(visit: Visiting, hall: Site) -> None:
@@ -204,7 +204,7 @@ def damaged(site: Site, changes: Mapping[str, Any]) -> dict[str, Entry]:
     """A site whose files end so; each change takes the bytes of a file."""
     entries = dict(site.entries)
     for end, change in changes.items():
-        (name,) = (name for name in entries if is_of_sets(name) and end in name)
+        (name,) = (name for name in entries if is_other_form(name) and end in name)
         entries[name] = replace(entries[name], source=change(entries[name].read()), state=None)
     return entries
 

@@ -13,26 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import InputError, LimitError
-from ptmtools.output.names import INTERLACE, texture_name
+from ptmtools.output.names import texture_name
 from ptmtools.site.entry import DIGITS, Entry, state_of
 from ptmtools.store.folder import damaged
 from ptmtools.store.layout import sha256
+from ptmtools_systems.interlace.declarations import INTERLACED
 from ptmtools_systems.interlace.model import INDEX
 from ptmtools_systems.interlace.reading import read_manifest
 
-#: Folder of the sets.
-FOLDER = "data/sets"
 FORMAT, SCHEMA = "ptmtools interlaced images", 1
-
-
-def has_sets(index: Mapping[str, Any]) -> bool:
-    """Whether an index of the hints names interlaced images."""
-    return INTERLACE in index.get("textureSets", {})
-
-
-def is_of_sets(name: str) -> bool:
-    """Whether a file of a site is one of its sets."""
-    return name.startswith(f"{FOLDER}/")
 
 
 def set_entries(
@@ -46,9 +35,10 @@ def set_entries(
 
     Raises DatabaseError: PTM-D006 a manifest is damaged; and as ``place``.
     """
-    sets = []
+    assert INTERLACED.site
+    folder, sets = INTERLACED.site.folder, []
     for number, row in enumerate(index["textures"]):
-        url = index["textureSets"][INTERLACE].replace("{name}", texture_name(row["file"]))
+        url = index["textureSets"][INTERLACED.name].replace("{name}", texture_name(row["file"]))
         manifest, _ = place(url + INDEX)
         try:
             interlaced = read_manifest(manifest.parent)
@@ -59,10 +49,10 @@ def set_entries(
         for part in interlaced.parts:
             file, digest = place(url + part.name)
             files.append(f"{number:04}-{file.stem}-{digest[:DIGITS]}{file.suffix}")
-            own = f"{FOLDER}/{files[-1]}"
-            yield Entry(own, file, media, True, state=state_of(file.stat()), digest=digest)
+            name = f"{folder}/{files[-1]}"
+            yield Entry(name, file, media, True, state=state_of(file.stat()), digest=digest)
         sets.append({"manifest": interlaced.document(), "files": files})
     document = {"format": FORMAT, "schema": SCHEMA, "sets": sets}
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
-    own = f"{FOLDER}/sets-{sha256(text)[:DIGITS]}.json"
-    yield Entry(own, text, "application/json", True, compressed=True)
+    name = f"{folder}/sets-{sha256(text)[:DIGITS]}.json"
+    yield Entry(name, text, "application/json", True, compressed=True)

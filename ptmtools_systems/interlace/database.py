@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.output.content import Content
 from ptmtools.output.model import TextureRecord
-from ptmtools.output.names import HINTS, INTERLACE, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
+from ptmtools.output.names import HINTS, texture_name
 from ptmtools.output.validation.files import ServedDatabase
 from ptmtools.parallel import ordered
 from ptmtools.texture import reader
@@ -25,6 +25,7 @@ from ptmtools.texture.model import Limits
 from ptmtools.texture.previews import decoded_preview
 from ptmtools.texture.samples import in_eight_bits
 from ptmtools.texture.sources import first_bytes
+from ptmtools_systems.interlace.declarations import INTERLACED
 from ptmtools_systems.interlace.model import INDEX
 from ptmtools_systems.interlace.reading import validate_interlaced
 from ptmtools_systems.interlace.writing import Written, interlace
@@ -50,7 +51,7 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
             )
     sets = ordered(_interlaced, content.textures, content.workers)
     for record, written in zip(content.textures, sets, strict=True):
-        folder = INTERLACE_FILES.replace("{name}", texture_name(record.file))
+        folder = INTERLACED.texture_files.replace("{name}", texture_name(record.file))
         for name, data in written.named():
             yield f"{folder}{name}", data
 
@@ -86,10 +87,10 @@ def check_files(database: ServedDatabase) -> None:
     hints = database.hints
     if hints is None:
         return
-    template = hints.index.get("textureSets", {}).get(INTERLACE)
+    template = hints.index.get("textureSets", {}).get(INTERLACED.name)
     if template is None:
         database.at(HINTS, "textureSets").add(
-            "PTM-D700", f"does not name {INTERLACE}, whose files exist"
+            "PTM-D700", f"does not name {INTERLACED.name}, whose files exist"
         )
         return
     names = [texture_name(row["file"]) for row in hints.index["textures"]]
@@ -99,7 +100,7 @@ def check_files(database: ServedDatabase) -> None:
         folder = path.removesuffix(INDEX)
         report = validate_interlaced(database.folder / folder, database.limits)
         database.take(folder, (issue for issue in report.issues if issue.code != _STRAY))
-    folder = f"{INTERLACE_FOLDER}/"
+    (folder,) = INTERLACED.owns
     sets = {p for p in database.files if p.startswith(folder) and p.endswith(f"/{INDEX}")}
     for path in sorted(sets - set(indices)):
         database.at(path).add("PTM-D710", "belongs to no texture")

@@ -1,0 +1,17 @@
+"""Campuses: the kind of folder that `ptm campus` writes."""
+
+from ptmtools import schemas
+from ptmtools.folder_kinds import FolderKind
+from ptmtools.lazy import Lazy
+
+CAMPUS_FOLDER = FolderKind(
+    index="campus.json",
+    about="campus",
+    again="ptm campus MODEL",
+    check=Lazy("ptmtools_systems.campus.validation:check_campus"),
+    describe=Lazy("ptmtools_systems.campus.reading:describe_campus"),
+    schema=schemas.CAMPUS,
+    script="campus.js",
+    files=Lazy("ptmtools_systems.campus.reading:page_files"),
+    records=True,
+)

@@ -1,0 +1,30 @@
+"""Interlaced images: the kind of folder that `ptm interlace` writes, and the form of the textures
+of a database."""
+
+from ptmtools import schemas
+from ptmtools.folder_kinds import FolderKind
+from ptmtools.lazy import Lazy
+from ptmtools.output.emitter import Emitter, SiteTextures
+
+INTERLACE_FOLDER = FolderKind(
+    index="interlace.json",
+    about="interlaced image",
+    again="ptm interlace IMAGE",
+    check=Lazy("ptmtools_systems.interlace.reading:validate_interlaced"),
+    describe=Lazy("ptmtools_systems.interlace.reading:describe"),
+    schema=schemas.INTERLACE,
+    script="interlace.js",
+    files=Lazy("ptmtools_systems.interlace.reading:page_files"),
+)
+INTERLACED = Emitter(
+    name="interlace",
+    about="an interlaced image of each texture, in interlace/",
+    owns=("interlace/",),
+    writer=Lazy("ptmtools_systems.interlace.database:interlaced_files"),
+    reader=Lazy("ptmtools_systems.interlace.database:read_file"),
+    check=Lazy("ptmtools_systems.interlace.database:check_files"),
+    texture_files="interlace/{name}/",
+    site=SiteTextures(
+        "sets", "data/sets", Lazy("ptmtools_systems.interlace.site_sets:set_entries")
+    ),
+)
