@@ -150,13 +150,13 @@ def open_below(root: str | os.PathLike[str], name: str) -> BufferedReader:
 
     Raises OSError, with ELOOP for a link; ValueError.
     """
-    here = Path(root)
+    path = Path(root)
     for step in name.split("/"):
-        here /= step
-        if here.is_symlink():
+        path /= step
+        if path.is_symlink():
             message = "a symbolic link, which is not followed"
-            raise OSError(errno.ELOOP, message, os.fspath(here))
-    return open_regular(here)
+            raise OSError(errno.ELOOP, message, os.fspath(path))
+    return open_regular(path)
 
 
 def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
@@ -168,26 +168,26 @@ def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
     OutputError: PTM-O005 if a component below the root is a symbolic link; PTM-O002 if one is no
         folder, or the name leads out of the root, or a folder cannot be created; PTM-O003.
     """
-    here, steps = root, _steps(root, relative)
-    with writing(here.joinpath(*steps)):
+    path, steps = root, _steps(root, relative)
+    with writing(path.joinpath(*steps)):
         if make:
-            here.mkdir(parents=True, exist_ok=True)
+            path.mkdir(parents=True, exist_ok=True)
         for step in steps:
-            here /= step
+            path /= step
             if make:
                 with contextlib.suppress(FileExistsError):
-                    here.mkdir()
-            mode = _mode(here)
+                    path.mkdir()
+            mode = _mode(path)
             if stat.S_ISLNK(mode):
-                raise _link(here)
+                raise _link_error(path)
             if mode and not stat.S_ISDIR(mode):
                 raise OutputError(
                     "PTM-O002",
                     "is not a folder",
-                    file=here,
+                    file=path,
                     remedy="move it away, or specify another output",
                 )
-    return here
+    return path
 
 
 def real_file(root: Path, relative: str) -> Path | None:
@@ -203,7 +203,7 @@ def real_file(root: Path, relative: str) -> Path | None:
     with writing(file):
         mode = _mode(file)
     if stat.S_ISLNK(mode):
-        raise _link(file)
+        raise _link_error(file)
     return file if stat.S_ISREG(mode) else None
 
 
@@ -236,7 +236,7 @@ def _mode(path: Path) -> int:
         return 0
 
 
-def _link(path: Path) -> OutputError:
+def _link_error(path: Path) -> OutputError:
     return OutputError(
         "PTM-O005",
         "is a symbolic link, which is not followed when writing",
@@ -245,12 +245,12 @@ def _link(path: Path) -> OutputError:
     )
 
 
-def exchanged(one: Path, other: Path) -> bool:
+def exchange(first: Path, second: Path) -> bool:
     """Exchanges the names of two folders of one disk atomically; False where that is impossible."""
     call = getattr(ctypes.CDLL(None), "renameat2", None) if sys.platform == "linux" else None
     if call is None:
         return False
-    return bool(call(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0)
+    return bool(call(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _EXCHANGE) == 0)
 
 
 def output_error(target: str | os.PathLike[str], error: OSError) -> OutputError:

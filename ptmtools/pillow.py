@@ -43,10 +43,10 @@ from PIL import Image, ImageFile
 
 from ptmtools.errors import InputError, PtmError
 from ptmtools.texture.container import MAGIC
-from ptmtools.texture.images.opening import ORIENTATION, described, orientation_of, stripped
+from ptmtools.texture.images.opening import ORIENTATION, description_of, orientation_of, read_strips
 from ptmtools.texture.model import Description, EncodeOptions, Limits, PtmHeader
 from ptmtools.texture.reader import PtmReader
-from ptmtools.texture.sources import Rows, ranges_of
+from ptmtools.texture.sources import RowSource, ranges_of
 
 FORMAT = "PTM"
 #: Kind of sample and components → mode.
@@ -248,7 +248,7 @@ def _save(im: Image.Image, fp: IO[bytes], filename: str | bytes) -> None:
 
 def _description(im: Image.Image, given: Mapping[str, Any]) -> Description:
     """The image's own description, unless the arguments of ``save`` override it."""
-    kept = described(im)
+    kept = description_of(im)
     if "icc_profile" in given:
         kept = replace(kept, icc=given["icc_profile"] or None)
     if "exif" in given:
@@ -264,7 +264,7 @@ def _exif(given: Image.Exif | bytes | None) -> Image.Exif:
     return exif
 
 
-def _rows(im: Image.Image) -> Rows:
+def _rows(im: Image.Image) -> RowSource:
     if im.mode == "1":
         im = im.convert("L")
     elif im.mode in ("P", "PA"):
@@ -277,7 +277,7 @@ def _rows(im: Image.Image) -> Rows:
         return np.asarray(strip).reshape(-1, im.width, components)
 
     dtype = {"F": "float32", "I": "uint16"}.get(im.mode[0], "uint8")
-    return stripped([im], components, dtype, texels, _colour_key(im)).texels
+    return read_strips([im], components, dtype, texels, _colour_key(im)).texels
 
 
 def _colour_key(im: Image.Image) -> tuple[int, ...] | None:
@@ -291,9 +291,9 @@ def _colour_key(im: Image.Image) -> tuple[int, ...] | None:
 
 
 @contextmanager
-def _pillow_errors(kind: type[Exception] = OSError) -> Iterator[None]:
+def _pillow_errors(error_class: type[Exception] = OSError) -> Iterator[None]:
     """Turns our errors into OSError, which Pillow's users expect, or another class."""
     try:
         yield
     except PtmError as error:
-        raise kind(str(error)) from error
+        raise error_class(str(error)) from error

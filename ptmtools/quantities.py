@@ -28,9 +28,9 @@ def size(count: int) -> str:
     return f"{count} B"
 
 
-def count(number: int, one: str, many: str | None = None) -> str:
+def count(number: int, singular: str, plural: str | None = None) -> str:
     """``1 portal``, ``2 portals``."""
-    return f"{number:,} {one if number == 1 else many or one + 's'}"
+    return f"{number:,} {singular if number == 1 else plural or singular + 's'}"
 
 
 def parse_bandwidth(text: str) -> int | None:
@@ -42,7 +42,7 @@ def parse_bandwidth(text: str) -> int | None:
         return None
     bits = _quantity(text, _BITS)
     if bits is None or bits < 1:
-        raise _refused(text, "bandwidth", "bit/s, such as 56k, 4M or inf")
+        raise _quantity_error(text, "bandwidth", "bit/s, such as 56k, 4M or inf")
     return round(bits)
 
 
@@ -50,7 +50,7 @@ def parse_duration(text: str) -> float:
     """Seconds in ``100ms``, ``0.1s``, ``0.1``; InputError PTM-I111 for anything else."""
     seconds = _quantity(text, _SECONDS)
     if seconds is None:
-        raise _refused(text, "duration", "seconds or milliseconds, such as 0.1 or 100ms")
+        raise _quantity_error(text, "duration", "seconds or milliseconds, such as 0.1 or 100ms")
     return float(seconds)
 
 
@@ -81,10 +81,12 @@ def parse_memory(text: str) -> MemorySize:
         return MemorySize(text)
     if share := _quantity(text, {"%": Fraction(1, 100)}):
         return MemorySize(text, share=share)
-    held = math.floor(_quantity(text, _BYTES) or 0)
-    if not held:
-        raise _refused(text, "amount of memory", "bytes or a share, such as 4MiB, 4MB, 10% or inf")
-    return MemorySize(text, held)
+    amount = math.floor(_quantity(text, _BYTES) or 0)
+    if not amount:
+        raise _quantity_error(
+            text, "amount of memory", "bytes or a share, such as 4MiB, 4MB, 10% or inf"
+        )
+    return MemorySize(text, amount)
 
 
 def _quantity(text: str, units: Mapping[str, int | Fraction]) -> Fraction | None:
@@ -95,5 +97,5 @@ def _quantity(text: str, units: Mapping[str, int | Fraction]) -> Fraction | None
     return Fraction(match[1]) * units[match[2]]
 
 
-def _refused(text: str, what: str, remedy: str) -> InputError:
+def _quantity_error(text: str, what: str, remedy: str) -> InputError:
     return InputError("PTM-I111", f"{text[:40]!r} is no {what}", remedy=f"use {remedy}")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ptmtools.errors import OutputError
-from ptmtools.files import exchanged, leads_inside, open_regular, refuse_existing, writing
+from ptmtools.files import exchange, leads_inside, open_regular, refuse_existing, writing
 
 #: The format of an index is within this many bytes.
 _HEAD = 256
@@ -150,7 +150,7 @@ def _replace(target: Path, new: Path, old: Path) -> None:
     """Moves ``new`` to ``target``, and an existing target to ``new`` or ``old``; atomically where
     that is possible."""
     exists = os.path.lexists(target)
-    if exists and exchanged(new, target):
+    if exists and exchange(new, target):
         return
     if exists:
         os.rename(target, old)

@@ -46,7 +46,7 @@ def test_at_no_moment_there_is_none(
 ) -> None:
     """Where folders can be exchanged nothing is renamed; elsewhere a failure is undone."""
     if not can_exchange:
-        monkeypatch.setattr(whole_folder, "exchanged", lambda *_: False)
+        monkeypatch.setattr(whole_folder, "exchange", lambda *_: False)
     renamed: list[str] = []
     rename = os.rename
 
@@ -57,7 +57,7 @@ def test_at_no_moment_there_is_none(
         rename(one, other)
 
     monkeypatch.setattr(os, "rename", fail)
-    if can_exchange and whole_folder.exchanged(folder, folder):
+    if can_exchange and whole_folder.exchange(folder, folder):
         FORM.write(folder, files(b"after"), force=True)
         assert (held(folder), renamed) == (b"after", [])
     else:

@@ -31,7 +31,7 @@ from images import OUTPUT
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, encode, load_image
-from ptmtools.texture.comparison import best
+from ptmtools.texture.comparison import time_best
 
 Samples = NDArray[Any]
 SIDE = 768
@@ -91,8 +91,8 @@ def fetch_panoramas() -> None:
 
 def exact(image: Samples, profile: str) -> tuple[int, float, float]:
     """Bytes, seconds to encode and to decode; checks every bit of every level."""
-    encoding, data = best(lambda: encode(image, EncodeOptions(profile)), 2)
-    decoding, levels = best(lambda: list(decode_levels(data)), 2)
+    encoding, data = time_best(lambda: encode(image, EncodeOptions(profile)), 2)
+    decoding, levels = time_best(lambda: list(decode_levels(data)), 2)
     for actual, wanted in zip(levels, build_pyramid(image), strict=True):
         assert actual.tobytes() == wanted.tobytes(), "not exact"
     return len(data), encoding, decoding

@@ -27,19 +27,19 @@ from images import image_files, sample, sets
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, decode, encode, read_image
-from ptmtools.texture.comparison import Codec, Measured, codecs, measure, total
+from ptmtools.texture.comparison import Codec, CodecFigures, codecs, measure, total
 
 #: Largest total of `fast` over PNG, and of `small` over JPEG XL effort 7, by set.
 FAST_GOALS = {"Kodak": 0.76, "textures": 0.88, "scenes": 0.90}
 SMALL_GOAL = 0.95
 
 
-def ratio(part: Measured, whole: Measured) -> float:
+def ratio(part: CodecFigures, whole: CodecFigures) -> float:
     """All levels of one over the finest of the other."""
     return part.all_bytes / (whole.finest_bytes or part.all_bytes)
 
 
-def table(measured: Sequence[Measured]) -> None:
+def table(measured: Sequence[CodecFigures]) -> None:
     """A line for each codec."""
     png = next(one for one in measured if one.codec == "PNG")
     assert png.finest_bytes
@@ -58,7 +58,7 @@ def table(measured: Sequence[Measured]) -> None:
         print(f"  {one.codec:22} {finest} {every} {speed[0]:6.1f} / {speed[1]:6.1f}")
 
 
-def verdicts(name: str, files: list[Path], found: list[list[Measured]]) -> None:
+def verdicts(name: str, files: list[Path], found: list[list[CodecFigures]]) -> None:
     """What is asked, and what was found."""
     sums = {one.codec: one for one in total(found)}
     png = sums["PNG"]

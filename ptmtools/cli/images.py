@@ -45,7 +45,7 @@ from ptmtools.texture.model import Description, EncodeOptions, Limits
 from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
-    from ptmtools.texture.comparison import Measured
+    from ptmtools.texture.comparison import CodecFigures
 
 
 @click.command("encode", cls=Command)
@@ -348,7 +348,7 @@ def compare(
     console.result({"images": tables, "total": [asdict(one) for one in sums]}, lines)
 
 
-def _table(title: str, rows: list[Measured]) -> Iterator[str]:
+def _table(title: str, rows: list[CodecFigures]) -> Iterator[str]:
     """The lines of a table of sizes, also as multiples of the finest level as PNG, and speeds."""
     png = next((one.finest_bytes for one in rows if one.codec == "PNG"), None)
     yield title

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
     from ptmtools.texture.previews import Preview
-    from ptmtools.texture.sources import Source
+    from ptmtools.texture.sources import PtmSource
 
 
 Vector = tuple[float, float, float]
@@ -36,7 +36,7 @@ class PreviewRecord:
 
     file: str
     preview: Preview
-    stored: Source | None = field(default=None, compare=False)
+    stored: PtmSource | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class TextureRecord:
     fallback_level: int | None = None
     fallback_bytes: int = 0
     detail: Detail | None = None
-    stored: Source | None = field(default=None, compare=False)
+    stored: PtmSource | None = field(default=None, compare=False)
     errors: tuple[float, ...] = ()
     previews: tuple[PreviewRecord, ...] = ()
     cell: int = -1

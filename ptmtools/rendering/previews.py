@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import DatabaseError
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import BUILD, Served
-from ptmtools.texture.previews import decoded_preview
+from ptmtools.texture.previews import decode_preview
 from ptmtools.texture.pyramid import build_pyramid
 
 Texels = NDArray[np.uint8]
@@ -40,7 +40,7 @@ def read_preview(served: Served, texture: int, number: int, *, alpha: bool = Fal
 def _decoded(file: Path, data: bytes, components: int) -> Texels:
     """(h, w, components) the texels of an image."""
     try:
-        return decoded_preview(data, components)
+        return decode_preview(data, components)
     except (OSError, ValueError, SyntaxError) as fault:
         raise _damaged(file, f"cannot be decoded ({fault})") from None
 

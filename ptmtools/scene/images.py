@@ -268,13 +268,13 @@ def is_plain(data: bytes, name: str, limit: int) -> bool:
 
 def _decode(data: bytes, limit: int) -> Image.Image:
     """Raises InputError if the image cannot be decoded, LimitError PTM-L104."""
-    from ptmtools.texture.images.opening import load, opened, pillow_faults
+    from ptmtools.texture.images.opening import load, open_image, pillow_faults
 
     if not data:
         raise InputError("PTM-I125", "empty file")
     limits = Limits(limit)
     with pillow_faults():
-        image = opened(cast("BinaryIO", io.BytesIO(data)), limits)
+        image = open_image(cast("BinaryIO", io.BytesIO(data)), limits)
         check_size(*image.size, 4, limits)
         load(image)
     return image

@@ -22,7 +22,7 @@ from ptmtools.scene.orientation.up_axis import (
     candidates,
     evidence,
 )
-from ptmtools.texture.images.opening import opened
+from ptmtools.texture.images.opening import open_image
 from ptmtools.texture.model import Limits
 
 
@@ -107,7 +107,7 @@ def inspect(
 
 def _facts(image: SourceImage, options: IngestOptions) -> ImageFacts:
     data = image.load()
-    picture = opened(io.BytesIO(data), Limits(options.limit << 20))  # ingest has decoded it
+    picture = open_image(io.BytesIO(data), Limits(options.limit << 20))  # ingest has decoded it
     return ImageFacts(image.name, picture.format or "", *picture.size, len(data))
 
 

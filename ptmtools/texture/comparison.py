@@ -58,7 +58,7 @@ class Codec:
 
 
 @dataclass(frozen=True)
-class Measured:
+class CodecFigures:
     """The result of one codec on one image or several.
 
     Attributes
@@ -85,37 +85,37 @@ def codecs(profiles: Iterable[str] = PROFILES) -> list[Codec]:
     return [*map(_profile, profiles), *_rivals()]
 
 
-def measure(image: Samples, contenders: Sequence[Codec], repeat: int = 1) -> list[Measured]:
+def measure(image: Samples, contenders: Sequence[Codec], repeat: int = 1) -> list[CodecFigures]:
     """Measures each codec on (h, w, c) texels; times are the best of ``repeat``."""
     from ptmtools.texture.pyramid import build_pyramid
 
     levels = [np.ascontiguousarray(level) for level in build_pyramid(image)]
-    return [_measured(levels, codec, repeat) for codec in contenders]
+    return [_measure(levels, codec, repeat) for codec in contenders]
 
 
-def total(measured: Sequence[Sequence[Measured]]) -> list[Measured]:
+def total(measured: Sequence[Sequence[CodecFigures]]) -> list[CodecFigures]:
     """Sums over images; a codec that failed on one has no figures."""
     sums = []
     for column in zip(*measured, strict=True):
-        bad = next((one for one in column if one.problem), None)
-        finest = [one.finest_bytes for one in column if one.finest_bytes is not None]
+        bad = next((figures for figures in column if figures.problem), None)
+        finest = [figures.finest_bytes for figures in column if figures.finest_bytes is not None]
         sums.append(
             bad
-            or Measured(
+            or CodecFigures(
                 column[0].codec,
                 sum(finest) if finest else None,
-                sum(one.all_bytes for one in column),
-                sum(one.raw_bytes for one in column),
-                sum(one.encode_seconds for one in column),
-                sum(one.decode_seconds for one in column),
+                sum(figures.all_bytes for figures in column),
+                sum(figures.raw_bytes for figures in column),
+                sum(figures.encode_seconds for figures in column),
+                sum(figures.decode_seconds for figures in column),
             )
         )
     return sums
 
 
-def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
+def _measure(levels: list[Samples], codec: Codec, repeat: int) -> CodecFigures:
     image = levels[-1]
-    none = Measured(codec.name)
+    none = CodecFigures(codec.name)
     if codec.remedy:
         return replace(none, problem=f"not installed: {codec.remedy}")
     try:
@@ -126,10 +126,10 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
             size = (_CORNER, _CORNER, image.shape[2])
             grain = np.random.default_rng(0).integers(0, 64, size)
             first += [grain.astype(image.dtype), np.zeros(size, image.dtype)]
-        for one in first:
-            codec.decode(codec.encode(one), one.shape)
-        encoding, data = best(lambda: codec.encode(image), repeat)
-        decoding, back = best(lambda: codec.decode(data, image.shape), repeat)
+        for sample in first:
+            codec.decode(codec.encode(sample), sample.shape)
+        encoding, data = time_best(lambda: codec.encode(image), repeat)
+        decoding, back = time_best(lambda: codec.decode(data, image.shape), repeat)
         if back.dtype != image.dtype or back.tobytes() != image.tobytes():
             return replace(none, problem=f"does not give back {image.dtype} texels exactly")
         rest = 0 if codec.pyramid else sum(len(codec.encode(level)) for level in levels[:-1])
@@ -140,7 +140,7 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
         height, width, components = image.shape
         what = f"{width} x {height}, {components} components of {image.dtype}"
         return replace(none, problem=f"does not hold {what} ({reason})")
-    return Measured(
+    return CodecFigures(
         codec.name,
         None if codec.pyramid else len(data),
         len(data) + rest,
@@ -150,7 +150,7 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
     )
 
 
-def best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
+def time_best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
     """Shortest time of some repetitions, seconds, and the last result."""
     shortest, result = float("inf"), None
     for _ in range(repeat):

@@ -112,7 +112,7 @@ def read_header(data: bytes) -> PtmHeader:
     """
     _check_magic(data)
     if len(data) < _FIXED.size:
-        raise _cut_head(len(data))
+        raise _short_head_error(len(data))
     (_, version, profile_number, kind, width, height, components, count, trimmed, zero, size) = (
         _FIXED.unpack_from(data)
     )
@@ -124,13 +124,13 @@ def read_header(data: bytes) -> PtmHeader:
         )
     table = _FIXED.size + (_MORE.size if version > 1 else 0)
     if size != table + count * _ENTRY.size + _CRC.size or count > MAX_LEVELS:
-        raise _damaged_head("its size does not match the number of levels")
+        raise _head_error("its size does not match the number of levels")
     if len(data) < size:
-        raise _cut_head(len(data))
+        raise _short_head_error(len(data))
     (crc,) = _CRC.unpack_from(data, size - _CRC.size)
     if crc != zlib.crc32(data[: size - _CRC.size]):
-        raise _damaged_head("its checksum is wrong")
-    profile, samples = _known(version, profile_number, kind)
+        raise _head_error("its checksum is wrong")
+    profile, samples = _find_profile(version, profile_number, kind)
     if max(width, height) > MAX_SIDE:
         raise LimitError(
             "PTM-L104",
@@ -139,15 +139,15 @@ def read_header(data: bytes) -> PtmHeader:
         )
     sizes = _sizes(width, height, components, count, trimmed)
     if zero:
-        raise _damaged_head("a reserved byte is not 0")
+        raise _head_error("a reserved byte is not 0")
     tile = max_error = described = crc32 = 0
     if version > 1:
         tile, max_error, described, crc32 = _MORE.unpack_from(data, _FIXED.size)
     low, high = TILE_SIDES
     if tile and not (low <= tile <= high and tile % 2 == 0):
-        raise _damaged_head(f"tiles of {tile} texels are impossible")
+        raise _head_error(f"tiles of {tile} texels are impossible")
     if max_error > (samples.top_error if profile.lossy else 0) or described > DESCRIPTION_MAX:
-        raise _damaged_head("its largest error or the length of its description is impossible")
+        raise _head_error("its largest error or the length of its description is impossible")
     entries = [_ENTRY.unpack_from(data, table + i * _ENTRY.size) for i in range(count)]
     return PtmHeader(
         width=width,
@@ -164,7 +164,7 @@ def read_header(data: bytes) -> PtmHeader:
     )
 
 
-def _known(version: int, profile_number: int, kind: int) -> tuple[Profile, SampleKind]:
+def _find_profile(version: int, profile_number: int, kind: int) -> tuple[Profile, SampleKind]:
     """The profile and the kind of samples of these numbers in a head. Raises InputError PTM-I104,
     and as `Profiles.numbered`."""
     profile, samples = PROFILES.numbered(profile_number), KINDS_BY_NUMBER.get(kind)
@@ -194,7 +194,7 @@ def _levels(
         tiles = tile_counts(w, h, tile) if number else (1, 1)
         # No coder makes a group twice as long as its texels, except for a few bytes.
         if offset != expected or length > 2 * w * h * texel_bytes + 1024 * tiles[0] * tiles[1]:
-            raise _damaged_head(f"the byte range of level {number} is impossible")
+            raise _head_error(f"the byte range of level {number} is impossible")
         expected += length
         texels += w * h
         levels.append(Level(w, h, offset, length, crc, tiles, texels * texel_bytes))
@@ -219,7 +219,7 @@ def _sizes(
     )
     sizes = level_sizes(width, height) if possible else []
     if count + trimmed > len(sizes) or not count:
-        raise _damaged_head(
+        raise _head_error(
             f"{count} levels of {components} components, {trimmed} trimmed, cannot be those "
             f"of {width} x {height} texels"
         )
@@ -239,7 +239,7 @@ def _check_magic(data: bytes) -> None:
             remedy="convert it to PNG with a viewer for that format and encode the PNG",
         )
     if MAGIC.startswith(data):
-        raise _cut_head(len(data))
+        raise _short_head_error(len(data))
     raise InputError(
         "PTM-I101",
         "is not a progressive texture map (wrong file signature)",
@@ -247,7 +247,7 @@ def _check_magic(data: bytes) -> None:
     )
 
 
-def _cut_head(size: int) -> InputError:
+def _short_head_error(size: int) -> InputError:
     return InputError(
         "PTM-I103",
         f"is incomplete: cut inside its head, after {size} bytes",
@@ -256,7 +256,7 @@ def _cut_head(size: int) -> InputError:
     )
 
 
-def _damaged_head(what: str) -> InputError:
+def _head_error(what: str) -> InputError:
     return InputError("PTM-I105", f"its head is damaged: {what}", remedy=_ENCODE_AGAIN)
 
 
@@ -294,7 +294,7 @@ def parse_description(data: bytes) -> Description:
     values = list(_values(data))
     tags = dict(values)
     if len(tags) < len(values):
-        raise _impossible("a tag is repeated")
+        raise _description_error("a tag is repeated")
     fields: dict[str, Any] = {"icc": tags.get(b"ICCP")}
     for tag in _TAGS.keys() & tags.keys():
         name, count, letter, allowed = _TAGS[tag]
@@ -302,7 +302,7 @@ def parse_description(data: bytes) -> Description:
         fits = len(tags[tag]) == layout.size
         numbers = layout.unpack(tags[tag]) if fits else ()
         if not fits or not all(n in allowed for n in numbers):
-            raise _impossible("one of its values is out of range")
+            raise _description_error("one of its values is out of range")
         fields[name] = numbers if count > 1 else numbers[0]
     return Description(**fields)
 
@@ -311,16 +311,16 @@ def _values(data: bytes) -> Iterator[tuple[bytes, bytes]]:
     at = 0
     while at < len(data):
         if at + _TAGGED.size > len(data):
-            raise _impossible("it is cut short")
+            raise _description_error("it is cut short")
         tag, length = _TAGGED.unpack_from(data, at)
         at += _TAGGED.size
         if length > len(data) - at:
-            raise _impossible("it is cut short")
+            raise _description_error("it is cut short")
         yield tag, data[at : at + length]
         at += length
 
 
-def _impossible(what: str) -> InputError:
+def _description_error(what: str) -> InputError:
     return InputError(
         "PTM-I105",
         f"the description cannot be read: {what}",

@@ -125,7 +125,7 @@ class Detail:
     offsets: tuple[int, ...] = ()
 
 
-def rounded(value: float) -> float:
+def round_difference(value: float) -> float:
     """A difference with `DIGITS`."""
     return float(f"{value:.{DIGITS}g}")
 
@@ -168,7 +168,7 @@ def squares_between(level: Samples, below: Samples) -> float:
 
 
 @dataclass(frozen=True)
-class Between:
+class LevelPair:
     """A level and the one below, or a part of both; parts are added.
 
     Attributes
@@ -182,19 +182,21 @@ class Between:
     texels: int
     blocks: int
 
-    def __add__(self, other: Between) -> Between:
-        return Between(
-            self.difference + other.difference,
-            self.surplus + other.surplus,
-            self.texels + other.texels,
-            self.blocks + other.blocks,
+    def __add__(self, pair: LevelPair) -> LevelPair:
+        return LevelPair(
+            self.difference + pair.difference,
+            self.surplus + pair.surplus,
+            self.texels + pair.texels,
+            self.blocks + pair.blocks,
         )
 
 
-def between(level: Samples, below: Samples) -> Between:
+def compare_levels(level: Samples, below: Samples) -> LevelPair:
     """What `detail_of` needs of (h, w, c) texels and those of the level below."""
-    texels, blocks = (one.shape[0] * one.shape[1] for one in (level, below))
-    return Between(difference_between(level, below), surplus_between(level, below), texels, blocks)
+    texels, blocks = (shape[0] * shape[1] for shape in (level.shape, below.shape))
+    return LevelPair(
+        difference_between(level, below), surplus_between(level, below), texels, blocks
+    )
 
 
 def mean_surplus(levels: Sequence[Any]) -> float:
@@ -205,7 +207,7 @@ def mean_surplus(levels: Sequence[Any]) -> float:
     )
 
 
-def detail_of(coarsest: Samples, above: Iterable[Between], beyond: float = 0.0) -> Detail:
+def detail_of(coarsest: Samples, above: Iterable[LevelPair], beyond: float = 0.0) -> Detail:
     """The `Detail` of an image.
 
     Parameters
@@ -225,7 +227,7 @@ def detail_of(coarsest: Samples, above: Iterable[Between], beyond: float = 0.0) 
     seen = np.clip(np.nan_to_num(mean * scale + missing[0]), 0, _WHITE)
     red, green, blue = np.floor(np.broadcast_to(seen, 3) + 0.5).astype(int).tolist()
     offsets = tuple(math.floor(value + 0.5) for value in missing)
-    return Detail((0.0, *map(rounded, means)), (red, green, blue), offsets)
+    return Detail((0.0, *map(round_difference, means)), (red, green, blue), offsets)
 
 
 def with_offset(level: NDArray[np.uint8], offset: int) -> NDArray[np.uint8]:

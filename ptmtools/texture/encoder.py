@@ -32,7 +32,7 @@ from ptmtools.texture.container import (
     pack_description,
     pack_head,
 )
-from ptmtools.texture.detail import Between, Detail, between, detail_of, mean_surplus
+from ptmtools.texture.detail import Detail, LevelPair, compare_levels, detail_of, mean_surplus
 from ptmtools.texture.model import TILE_SIDES, Description, EncodeOptions, PtmHeader
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import (
@@ -44,7 +44,7 @@ from ptmtools.texture.pyramid import (
     tiles_under,
 )
 from ptmtools.texture.samples import KINDS
-from ptmtools.texture.sources import ImageRows, Rows, Samples
+from ptmtools.texture.sources import ImageRows, RowSource, Samples
 
 
 def check_options(options: EncodeOptions) -> None:
@@ -52,50 +52,50 @@ def check_options(options: EncodeOptions) -> None:
     for field in fields(options):
         value = getattr(options, field.name)
         if isinstance(field.default, int) and type(value) is not type(field.default):
-            raise _impossible(f"{field.name} is {value!r}", "use a whole number")
+            raise _options_error(f"{field.name} is {value!r}", "use a whole number")
     if options.profile not in PROFILES:
-        raise _impossible(
+        raise _options_error(
             f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILES)}"
         )
     if options.min_side < 1 or options.max_side < 0:
-        raise _impossible(
+        raise _options_error(
             "min_side or max_side is impossible",
             "min_side must be at least 1, max_side at least 1 or 0 for no limit",
         )
     first, last = options.min_level, options.max_level
     if (first < 0) == (last < 0) and first > last:
-        raise _impossible(
+        raise _options_error(
             f"there are no levels {first} to {last}", "min_level must be the coarser one"
         )
     low, high = TILE_SIDES
     if options.tile and not (low <= options.tile <= high and options.tile % 2 == 0):
-        raise _impossible(
+        raise _options_error(
             f"tiles of {options.tile} texels are impossible",
             f"use an even number from {low} to {high}, or 0 for none",
         )
     if options.max_error < 0:
-        raise _impossible("max_error is below 0", "use 0 for none")
+        raise _options_error("max_error is below 0", "use 0 for none")
     if options.max_error and not PROFILES[options.profile].lossy:
         others = " or ".join(name for name, profile in PROFILES.items() if profile.lossy)
-        raise _impossible(
+        raise _options_error(
             f"profile {options.profile!r} is always exact", f"for an allowed error use {others}"
         )
 
 
-def checked_coder(options: EncodeOptions, image: ImageRows) -> Coder:
+def coder_for(options: EncodeOptions, image: ImageRows) -> Coder:
     """The coder that the options ask for. Raises InputError PTM-I111 if it cannot code the
     image."""
     check_options(options)
     top = KINDS[image.dtype.name].top_error
     if options.max_error > top:
-        raise _impossible(
+        raise _options_error(
             f"an error of {options.max_error} cannot be allowed for {image.dtype.name} samples",
             f"use a number from 0 to {top}" if top else "use 0: floats are kept exactly",
         )
     return PROFILES[options.profile].coder
 
 
-def _impossible(what: str, remedy: str) -> InputError:
+def _options_error(what: str, remedy: str) -> InputError:
     return InputError("PTM-I111", what, remedy=remedy)
 
 
@@ -134,7 +134,7 @@ _PLAIN = Description()
 
 
 def encode(
-    image: Rows,
+    image: RowSource,
     options: EncodeOptions = _DEFAULTS,
     *,
     description: Description = _PLAIN,
@@ -160,7 +160,7 @@ def encode(
 
 def encode_to(
     file: IO[bytes],
-    image: Rows,
+    image: RowSource,
     options: EncodeOptions = _DEFAULTS,
     *,
     description: Description = _PLAIN,
@@ -180,7 +180,7 @@ def encode_to(
             remedy="open it for writing",
         )
     rows = ImageRows(image)
-    encoding = _Encoding(checked_coder(options, rows), options, threads)
+    encoding = _LevelEncoder(coder_for(options, rows), options, threads)
     described = pack_description(description)
     if len(described) > DESCRIPTION_MAX:
         raise LimitError(
@@ -195,10 +195,10 @@ def encode_to(
     single, tiled, finer = _levels(rows, kept, options.tile)
     beyond = mean_surplus(finer)
     del finer
-    tiles = encoding.single([_whole(level) for level in single], more=bool(tiled))
+    tiles = encoding.encode_single([_read_whole(level) for level in single], more=bool(tiled))
     del single
     coarsest, below, memory = tiles[0].texels, tiles[-1].texels, tiles[-1].memory
-    above = [between(tile.texels, under.texels) for under, tile in pairwise(tiles)]
+    above = [compare_levels(tile.texels, under.texels) for under, tile in pairwise(tiles)]
     groups: list[tuple[int, int]] = []
     for tile in tiles:
         file.write(tile.data)
@@ -207,7 +207,7 @@ def encode_to(
     while tiled:
         # The finest of them may be the image itself, of which nothing is kept.
         level = tiled.pop(0)
-        group, below, pair = encoding.tiled(file, level, below, memory, finest=not tiled)
+        group, below, pair = encoding.write_tiled(file, level, below, memory, finest=not tiled)
         groups.append(group)
         above.append(pair)
     end = file.tell()
@@ -219,14 +219,14 @@ def encode_to(
 
 
 @dataclass(frozen=True)
-class _Encoding:
+class _LevelEncoder:
     """How the levels of one image are coded."""
 
     coder: Coder
     options: EncodeOptions
     threads: int
 
-    def single(self, levels: list[Samples], more: bool) -> list[Tile]:
+    def encode_single(self, levels: list[Samples], more: bool) -> list[Tile]:
         """The levels of one tile each, coarsest first; ``more``: others come after them.
 
         With an allowed error they are coded with and without it: flat images are smaller without,
@@ -247,18 +247,18 @@ class _Encoding:
             tiles.append(self._tile(level, tiles[-1].texels, coding, factor))
         return tiles
 
-    def tiled(
+    def write_tiled(
         self, file: IO[bytes], level: Samples | ImageRows, below: Samples, memory: Any, finest: bool
-    ) -> tuple[tuple[int, int], Samples, Between]:
-        """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
-        the texels as a decoder has them, none of the finest level; and what is `between` them and
-        those below."""
+    ) -> tuple[tuple[int, int], Samples, LevelPair]:
+        """Writes index and tiles of a level of several. Returns length of the group and
+        CRC-32 of the index; the texels as a decoder has them, none of the finest level; and how
+        they compare with those below (`compare_levels`)."""
         side, coding = self.options.tile, Coding(self.options.max_error, memory)
         height, width = level.shape[:2]
         across, down = tile_counts(width, height, side)
         texels = below[:0]
         if not finest:
-            whole = _whole(level)
+            whole = _read_whole(level)
             texels = np.empty_like(whole) if self.options.max_error else whole
 
         def boxes() -> Iterator[tuple[Box, Samples]]:
@@ -268,16 +268,16 @@ class _Encoding:
                     strip = level[box.y0 : box.y1]
                 yield box, strip
 
-        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile, Between]:
+        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile, LevelPair]:
             box, strip = job
             piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
             under = np.ascontiguousarray(below[box.below.slices])
             tile = self._tile(piece, under, coding, 1.0 if finest else EXACT_FACTOR)
-            return box, tile, between(tile.texels, under)
+            return box, tile, compare_levels(tile.texels, under)
 
         start = file.tell()
         file.write(bytes(across * down * TILE_ENTRY.size))
-        index, pair = bytearray(), Between(0.0, 0.0, 0, 0)
+        index, pair = bytearray(), LevelPair(0.0, 0.0, 0, 0)
         for box, tile, more in ordered(coded, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
@@ -323,5 +323,5 @@ def _levels(
     return levels[:single], levels[single:], [*pyramid[kept[-1] - len(sizes) :]]
 
 
-def _whole(level: Samples | ImageRows) -> Samples:
+def _read_whole(level: Samples | ImageRows) -> Samples:
     return level[0 : level.shape[0]]

@@ -190,13 +190,13 @@ class Pyramid:
     def __init__(self, levels: Sequence[Samples], finer: Sequence[Samples] = ()) -> None:
         import numpy as np
 
-        from ptmtools.texture.detail import between, detail_of, mean_surplus, squares_between
+        from ptmtools.texture.detail import compare_levels, detail_of, mean_surplus, squares_between
 
         self.levels = levels
         pairs = list(zip(levels[1:], levels[:-1], strict=True))
         sizes = [level.shape[0] * level.shape[1] for level in levels]
         beyond = mean_surplus([levels[-1], *finer])
-        self.detail = detail_of(levels[0], (between(*pair) for pair in pairs), beyond)
+        self.detail = detail_of(levels[0], (compare_levels(*pair) for pair in pairs), beyond)
         squares = [squares_between(*pair) / n for pair, n in zip(pairs, sizes[1:], strict=True)]
         #: Mean squares from the finest level.
         self.squares = [*np.cumsum(squares[::-1])[::-1].tolist(), 0.0]
@@ -204,9 +204,9 @@ class Pyramid:
     @property
     def errors(self) -> tuple[float, ...]:
         """See `Steps`."""
-        from ptmtools.texture.detail import rounded
+        from ptmtools.texture.detail import round_difference
 
-        return tuple(rounded(math.sqrt(square)) for square in self.squares)
+        return tuple(round_difference(math.sqrt(square)) for square in self.squares)
 
     def preview(self, level: int, quality: int, wanted: str) -> tuple[Preview, bytes]:
         """The preview of a level, and its file; in another format where the one wanted holds no
@@ -222,19 +222,19 @@ class Pyramid:
             if (FORMATS[name].alpha or not alpha) and side <= FORMATS[name].side
         )
         data = image_bytes(texels, name, quality)
-        return self.measured(level, data, name), data
+        return self.measure(level, data, name), data
 
-    def measured(self, level: int, data: bytes, name: str) -> Preview:
+    def measure(self, level: int, data: bytes, name: str) -> Preview:
         """The preview that a file is of a level."""
         import numpy as np
 
-        from ptmtools.texture.detail import colours_of, rounded
+        from ptmtools.texture.detail import colours_of, round_difference
 
         texels = self.levels[level]
         height, width, components = texels.shape
         colours = colours_of(components)
         length = square = 0.0
-        decoded = decoded_preview(data, components)
+        decoded = decode_preview(data, components)
         for y in range(0, height, 256):
             strip = slice(y, y + 256)
             apart = decoded[strip, :, :colours].astype(np.float32) - texels[strip, :, :colours]
@@ -244,7 +244,13 @@ class Pyramid:
         texel_count = height * width
         error = math.sqrt(self.squares[level] + square / texel_count)
         return Preview(
-            level, width, height, len(data), name, rounded(length / texel_count), rounded(error)
+            level,
+            width,
+            height,
+            len(data),
+            name,
+            round_difference(length / texel_count),
+            round_difference(error),
         )
 
     def source(self, data: bytes, name: str) -> Preview:
@@ -253,29 +259,29 @@ class Pyramid:
         return Preview(len(self.levels) - 1, width, height, len(data), name, 0.0, 0.0, exact=True)
 
     def ladder(
-        self, options: PreviewOptions, most: Mapping[int, int], total: float = math.inf
+        self, options: PreviewOptions, limits: Mapping[int, int], total: float = math.inf
     ) -> list[tuple[Preview, bytes]]:
         """The previews of levels from `FIRST_SIDE` on, by ascending level.
 
         Parameters
         ----------
-        most: the greatest number of bytes worth while, for each level that may have a preview.
+        limits: the greatest number of bytes worth while, for each level that may have a preview.
         total: bytes of all previews; finer ones are left out from the first that exceeds it.
         """
         kept: list[tuple[Preview, bytes]] = []
         finest = len(self.levels) - 1
-        for level, limit in sorted(most.items()):
+        for level, limit in sorted(limits.items()):
             if max(self.levels[level].shape[:2]) < FIRST_SIDE and level < finest:
                 continue
             lower = 0 if level == finest else LADDER
             quality = max(options.preview - lower, min(options.preview, LOWEST))
-            made = self.preview(level, quality, options.preview_format)
-            if made[0].bytes > limit:
+            preview, file = self.preview(level, quality, options.preview_format)
+            if preview.bytes > limit:
                 continue
-            total -= made[0].bytes
+            total -= preview.bytes
             if total < 0:
                 break
-            kept.append(made)
+            kept.append((preview, file))
         return kept
 
 
@@ -307,7 +313,7 @@ def image_bytes(texels: Samples, name: str, quality: int) -> bytes:
     return buffer.getvalue()
 
 
-def decoded_preview(data: bytes, components: int) -> NDArray[np.uint8]:
+def decode_preview(data: bytes, components: int) -> NDArray[np.uint8]:
     """(h, w, components) the texels of a preview's file. Raises what Pillow raises."""
     import numpy as np
     from PIL import Image

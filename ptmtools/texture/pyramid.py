@@ -105,7 +105,7 @@ class Box(NamedTuple):
         """For indexing an array of rows."""
         return slice(self.y0, self.y1), slice(self.x0, self.x1)
 
-    def within(self, outer: Box) -> Box:
+    def relative_to(self, outer: Box) -> Box:
         """The same rectangle, counted from the corner of another."""
         return Box(self.x0 - outer.x0, self.y0 - outer.y0, self.x1 - outer.x0, self.y1 - outer.y0)
 
@@ -128,7 +128,7 @@ def tile_box(width: int, height: int, side: int, column: int, row: int) -> Box:
     )
 
 
-def covering(width: int, height: int, side: int, box: Box) -> Box:
+def covering_box(width: int, height: int, side: int, box: Box) -> Box:
     """The rectangle of all tiles that share a texel with ``box``."""
     columns, rows = _tiles(width, height, side, box)
     first = tile_box(width, height, side, columns[0], rows[0])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.parallel import ordered
 from ptmtools.texture.coder import Coder, Coding, Shape, Tile
-from ptmtools.texture.coders.group import damaged
+from ptmtools.texture.coders.group import group_error
 from ptmtools.texture.container import (
     EXACT,
     HEAD_MAX,
@@ -31,8 +31,8 @@ from ptmtools.texture.container import (
 )
 from ptmtools.texture.model import Description, Level, Limits, PtmHeader
 from ptmtools.texture.profiles import PROFILES
-from ptmtools.texture.pyramid import Box, covering, tiles_under
-from ptmtools.texture.sources import Ranges, Source, ranges_of
+from ptmtools.texture.pyramid import Box, covering_box, tiles_under
+from ptmtools.texture.sources import PtmSource, Ranges, ranges_of
 
 Samples = NDArray[Any]
 _LIMITS = Limits()
@@ -41,7 +41,7 @@ _LIMITS = Limits()
 PLAIN_WORK, WORK = 10, 33
 
 
-def open(source: Source, *, limits: Limits = _LIMITS, threads: int = 1) -> PtmReader:
+def open(source: PtmSource, *, limits: Limits = _LIMITS, threads: int = 1) -> PtmReader:
     """Opens a `.ptm` to take levels from; reads only its head.
 
     Parameters
@@ -112,7 +112,7 @@ class PtmReader:
         """Colour and orientation. Raises InputError PTM-I103, PTM-I108, PTM-I105."""
         offset, length, crc32 = self.header.description
         with naming(self._ranges.name):
-            return parse_description(self._checked(offset, length, crc32, "description"))
+            return parse_description(self._read_checked(offset, length, crc32, "description"))
 
     def level(self, number: int | None = None) -> Samples:
         """Level ``number``, (h, w, c), rows from the top; None is the finest that is whole.
@@ -177,7 +177,7 @@ class PtmReader:
                 ]
             for offset, length, crc32, place in pieces:
                 try:
-                    self._checked(offset, length, crc32, place)
+                    self._read_checked(offset, length, crc32, place)
                 except InputError as error:
                     wrong.append(str(error))
         return wrong
@@ -206,7 +206,7 @@ class PtmReader:
                 remedy=f"it is {level.width} x {level.height} texels",
             )
         if number >= whole:
-            raise self._cut(f"level {number}", whole)
+            raise self._cut_error(f"level {number}", whole)
         return number
 
     def _window(self, number: int, box: Box) -> Samples:
@@ -215,7 +215,7 @@ class PtmReader:
         for n in range(number, -1, -1):
             level = self.header.levels[n]
             side = self.header.tile if level.tiled else 0
-            covered = covering(level.width, level.height, side, boxes[-1])
+            covered = covering_box(level.width, level.height, side, boxes[-1])
             self._check_limit(n, covered)
             boxes.append(covered.below)
         boxes.pop()
@@ -248,7 +248,7 @@ class PtmReader:
         shape = (level.height, level.width, header.components)
         place = f"level {number}"
         if below is None or not level.tiled:
-            data = self._checked(level.offset, level.length, level.crc32, place)
+            data = self._read_checked(level.offset, level.length, level.crc32, place)
             with naming(place=place):
                 if below is None:
                     tile = Tile(b"", self._coder.decode_base(data, shape, self.dtype))
@@ -262,9 +262,9 @@ class PtmReader:
         def decoded(job: tuple[int, Box]) -> tuple[Box, Samples]:
             tile_number, area = job
             where = f"{place}, tile {tile_number}"
-            under = np.ascontiguousarray(below.texels[area.below.within(below.box).slices])
+            under = np.ascontiguousarray(below.texels[area.below.relative_to(below.box).slices])
             offset, length, crc32 = index[tile_number].tolist()
-            data = self._checked(offset, length, crc32, where)
+            data = self._read_checked(offset, length, crc32, where)
             size = (area.y1 - area.y0, area.x1 - area.x0, header.components)
             with naming(place=where):
                 tile = self._decode(data, under, size, coding)
@@ -278,7 +278,7 @@ class PtmReader:
                 min(area.x1, box.x1),
                 min(area.y1, box.y1),
             )
-            texels[shared.within(box).slices] = part[shared.within(area).slices]
+            texels[shared.relative_to(box).slices] = part[shared.relative_to(area).slices]
         return _State(texels, box, below.memory)
 
     def _decode(self, data: bytes, below: Samples, shape: Shape, coding: Coding) -> Tile:
@@ -287,7 +287,7 @@ class PtmReader:
             if data[:1] == bytes([EXACT]):
                 coding = replace(coding, max_error=0)
             elif data[:1] != bytes([WITHIN]):
-                raise damaged("it is neither exact nor within the error")
+                raise group_error("it is neither exact nor within the error")
             data = data[1:]
         return self._coder.decode_tile(data, below, shape, coding)
 
@@ -295,7 +295,7 @@ class PtmReader:
         """Offset, length and CRC-32 (n, 3) of every tile of a level."""
         size = level.tiles[0] * level.tiles[1] * TILE_ENTRY.size
         if size <= level.length:
-            data = self._checked(level.offset, size, level.crc32, place)
+            data = self._read_checked(level.offset, size, level.crc32, place)
             entries = np.frombuffer(data, "<u4").reshape(-1, 2).astype(np.int64)
             ends = level.offset + size + np.cumsum(entries[:, 0])
             if ends[-1] == level.end:
@@ -307,11 +307,11 @@ class PtmReader:
             remedy="the file is damaged or its encoder does not conform; encode it again",
         )
 
-    def _checked(self, offset: int, length: int, crc32: int, place: str) -> bytes:
+    def _read_checked(self, offset: int, length: int, crc32: int, place: str) -> bytes:
         data = self._ranges.read(offset, length)
         if len(data) < length:
             self._end = offset + len(data)
-            raise self._cut(place)
+            raise self._cut_error(place)
         if zlib.crc32(data) != crc32:
             raise InputError(
                 "PTM-I108",
@@ -322,14 +322,14 @@ class PtmReader:
             )
         return data
 
-    def _cut(self, place: str, whole: int | None = None) -> InputError:
+    def _cut_error(self, place: str, whole: int | None = None) -> InputError:
         size = self._size
-        of = f" after {size} of {self.header.file_size} bytes" if size is not None else ""
+        extent = f" after {size} of {self.header.file_size} bytes" if size is not None else ""
         remedy = None
         if whole is not None:
             remedy = f"the last whole level is {whole - 1}" if whole else "no level is complete"
         return InputError(
-            "PTM-I103", f"is cut{of}, inside or before this", place=place, remedy=remedy
+            "PTM-I103", f"is cut{extent}, inside or before this", place=place, remedy=remedy
         )
 
 
@@ -343,7 +343,7 @@ class _State:
 
 
 def decode(
-    source: Source, level: int | None = None, limits: Limits = _LIMITS, *, threads: int = 1
+    source: PtmSource, level: int | None = None, limits: Limits = _LIMITS, *, threads: int = 1
 ) -> NDArray[Any]:
     """Level ``level`` of a `.ptm`: (h, w, c) of its kind, rows from the top.
 
@@ -358,7 +358,7 @@ def decode(
 
 
 def decode_levels(
-    source: Source, limits: Limits = _LIMITS, *, threads: int = 1
+    source: PtmSource, limits: Limits = _LIMITS, *, threads: int = 1
 ) -> Iterator[NDArray[Any]]:
     """All whole levels of a `.ptm`, coarsest first, each decoded once: as `decode` of each.
 

@@ -118,5 +118,5 @@ def in_eight_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
         return samples
     if samples.dtype == np.uint16:
         return (samples >> 8).astype(np.uint8)
-    held = np.nan_to_num(samples.astype(np.float32))
-    return np.rint(np.clip(held, 0, 1) * 255).astype(np.uint8)
+    finite = np.nan_to_num(samples.astype(np.float32))
+    return np.rint(np.clip(finite, 0, 1) * 255).astype(np.uint8)

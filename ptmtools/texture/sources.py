@@ -24,7 +24,7 @@ from ptmtools.texture.samples import KINDS
 #: ``read(offset, length)``: that range of the file, shorter only where the file ends.
 RangeReader = Callable[[int, int], bytes]
 #: The sources that `ptmtools.texture.open` accepts.
-Source = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO | RangeReader
+PtmSource = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO | RangeReader
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class Ranges:
     name: str | None = None
 
 
-def ranges_of(source: Source) -> Ranges:
+def ranges_of(source: PtmSource) -> Ranges:
     """``source`` as something to read ranges from; `Ranges.close` closes what this has opened.
 
     Raises
     ------
     InputError: PTM-I120 no such file; PTM-I122 a folder, or not readable.
-    TypeError: not a `Source`; a text file, for example.
+    TypeError: not a `PtmSource`; a text file, for example.
     """
     if isinstance(source, bytes | bytearray | memoryview):
         view = memoryview(source)
@@ -61,7 +61,7 @@ def ranges_of(source: Source) -> Ranges:
         file = open_file(source)
         return _ranges_of_file(file, file.close, os.fspath(source))
     if callable(source):
-        return Ranges(partial(_called, source))
+        return Ranges(partial(_call, source))
     unknown: object = source
     if isinstance(unknown, io.TextIOBase) or not hasattr(source, "read"):
         raise TypeError(
@@ -73,7 +73,7 @@ def ranges_of(source: Source) -> Ranges:
     return _ranges_of_file(source)
 
 
-def first_bytes(source: Source, length: int) -> bytes:
+def first_bytes(source: PtmSource, length: int) -> bytes:
     """The first bytes of a file, ``length`` or all; raises as `ranges_of`."""
     ranges = ranges_of(source)
     try:
@@ -82,7 +82,7 @@ def first_bytes(source: Source, length: int) -> bytes:
         ranges.close()
 
 
-def _called(read: RangeReader, offset: int, length: int) -> bytes:
+def _call(read: RangeReader, offset: int, length: int) -> bytes:
     """Calls the caller's function, which may read over a network."""
     data: object = read(offset, length)
     if not isinstance(data, bytes | bytearray | memoryview):
@@ -140,7 +140,7 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
 Samples = NDArray[Any]
 
 
-class Rows(Protocol):
+class RowSource(Protocol):
     """An image whose rows can be sliced: an array, a memory map, or a reader of rows from a
     file."""
 
@@ -159,7 +159,7 @@ class Rows(Protocol):
 class ImageRows:
     """The image as (h, w, c) rows of a native dtype. Raises InputError PTM-I126."""
 
-    def __init__(self, image: Rows) -> None:
+    def __init__(self, image: RowSource) -> None:
         if not (hasattr(image, "shape") and hasattr(image, "dtype")):
             raise InputError(
                 "PTM-I126",

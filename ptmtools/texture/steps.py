@@ -63,10 +63,10 @@ def encode_steps(
 
     Raises as `encode`; MissingComponentError PTM-M100 if Pillow lacks the format of the previews.
     """
-    return _Encoding(picture, source, options, previews, threads).encoded()
+    return _StepsEncoder(picture, source, options, previews, threads).encode_all()
 
 
-class _Encoding:
+class _StepsEncoder:
     """The encoding of one image."""
 
     def __init__(
@@ -92,12 +92,12 @@ class _Encoding:
         self._kept = kept
         self._coarse = kept[: coarse_levels([max(sizes[n]) for n in kept])]
         format = SOURCES.get(picture.lossy or "")
-        own = previews.exact != "always" and kept[-1] == len(sizes) - 1
-        own &= len(self._coarse) < len(kept)
-        self._format = format if own else None
+        is_exact = previews.exact != "always" and kept[-1] == len(sizes) - 1
+        is_exact &= len(self._coarse) < len(kept)
+        self._format = format if is_exact else None
         self._source = bare(source, picture.lossy or "") if self._format else b""
 
-    def encoded(self) -> EncodedSteps:
+    def encode_all(self) -> EncodedSteps:
         """See `encode_steps`."""
         from ptmtools.texture.container import read_header
 
@@ -116,8 +116,8 @@ class _Encoding:
             tuple(file for _, file in steps),
         )
 
-    def _ptm(self, last: int, most: float = 0) -> tuple[bytes, Detail]:
-        """The `.ptm` with the kept levels up to ``last``, with fewer if it has more than ``most``
+    def _ptm(self, last: int, limit: float = 0) -> tuple[bytes, Detail]:
+        """The `.ptm` with the kept levels up to ``last``, with fewer if it has more than ``limit``
         bytes; 0 is no limit."""
         from ptmtools.texture.encoder import encode_to
 
@@ -132,7 +132,7 @@ class _Encoding:
                 threads=self._threads,
             )
             data = buffer.getvalue()
-            if not most or len(data) <= most or last == self._kept[0]:
+            if not limit or len(data) <= limit or last == self._kept[0]:
                 return data, detail
             last -= 1
 
@@ -143,10 +143,10 @@ class _Encoding:
         count, pyramid, options = len(self._kept), self._pyramid, self._previews
         beyond = dict.fromkeys(range(levels, count), sys.maxsize)
         if self._format:
-            own = [(pyramid.source(self._source, self._format), self._source)]
+            source = [(pyramid.source(self._source, self._format), self._source)]
             del beyond[count - 1]
-            left = BESIDE * len(self._source) - len(data)
-            return [*(pyramid.ladder(options, beyond, left) if options.preview else []), *own]
+            room = BESIDE * len(self._source) - len(data)
+            return [*(pyramid.ladder(options, beyond, room) if options.preview else []), *source]
         if not options.preview:
             return []
         ends = [level.end for level in read_header(data).levels]

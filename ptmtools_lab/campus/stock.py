@@ -34,7 +34,7 @@ from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.pyramids import mip_levels, packed
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import to_srgb
-from ptmtools.texture.images.opening import load, opened, pillow_faults
+from ptmtools.texture.images.opening import load, open_image, pillow_faults
 from ptmtools.texture.model import Limits
 from ptmtools_systems.campus.meshes import Primitive, read_mesh, view_bytes
 from ptmtools_systems.campus.model import (
@@ -304,7 +304,7 @@ def _image(folder: Path, name: str, size: int) -> NDArray[np.uint8]:
     limits = Limits()
     try:
         with pillow_faults():
-            image = opened(io.BytesIO(file_bytes(folder, name)), limits)
+            image = open_image(io.BytesIO(file_bytes(folder, name)), limits)
             load(image)
             pixels = np.asarray(image.convert("RGB"))
     except PtmError as fault:

@@ -167,7 +167,7 @@ class _Check:
                 part_at.add("PTM-D804", "coordinates outside of the lightmap")
 
     def _image(self, texture: TextureFile) -> None:
-        from ptmtools.texture.images.opening import load, opened, pillow_faults
+        from ptmtools.texture.images.opening import load, open_image, pillow_faults
         from ptmtools.texture.images.picture import check_size
 
         data = self._recorded(texture)
@@ -179,7 +179,7 @@ class _Check:
             return
         try:
             with pillow_faults():
-                image = opened(cast("BinaryIO", io.BytesIO(data)), self._limits)
+                image = open_image(cast("BinaryIO", io.BytesIO(data)), self._limits)
                 check_size(*image.size, 4, self._limits)
                 load(image)
         except LimitError:

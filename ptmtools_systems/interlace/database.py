@@ -22,7 +22,7 @@ from ptmtools.parallel import ordered
 from ptmtools.texture import reader
 from ptmtools.texture.images import Picture
 from ptmtools.texture.model import Limits
-from ptmtools.texture.previews import decoded_preview
+from ptmtools.texture.previews import decode_preview
 from ptmtools.texture.samples import in_eight_bits
 from ptmtools.texture.sources import first_bytes
 from ptmtools_systems.interlace.declarations import INTERLACED
@@ -70,7 +70,7 @@ def _finest(record: TextureRecord, limits: Limits) -> NDArray[Any]:
         finest = record.previews[-1]
         assert finest.stored
         data = first_bytes(finest.stored, finest.preview.bytes)
-        return decoded_preview(data, record.components)
+        return decode_preview(data, record.components)
     assert record.stored
     with reader.open(record.stored, limits=limits) as ptm:
         texels = ptm.level(len(ptm.header.levels) - 1)

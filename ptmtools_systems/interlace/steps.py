@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.texture.sources import Rows
+from ptmtools.texture.sources import RowSource
 from ptmtools_systems.interlace.model import Axis
 
 Texels = NDArray[Any]
@@ -73,7 +73,7 @@ def nearest_power(side: int) -> int:
     return below if side * side < 2 * below * below else 2 * below
 
 
-def scaled(image: Rows, width: int, height: int) -> NDArray[Any]:
+def scaled(image: RowSource, width: int, height: int) -> NDArray[Any]:
     """An (h, w, c) image of unsigned integers, 1 to 4 components, at another size.
 
     Of 2 and 4 components the last is alpha.

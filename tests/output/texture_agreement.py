@@ -14,7 +14,7 @@ import numpy as np
 from ptmtools.errors import PtmError
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
 from ptmtools.texture import load_image, read_header
-from ptmtools.texture.detail import Detail, between, detail_of
+from ptmtools.texture.detail import Detail, compare_levels, detail_of
 from ptmtools.texture.reader import decode_levels
 from ptmtools.texture.samples import KINDS, in_eight_bits
 from ptmtools_systems.apo.files import inflated
@@ -39,7 +39,7 @@ def detail_of_levels(levels: Iterable[Any]) -> tuple[Detail, Any]:
     coarsest = finest = next(following)
     above = []
     for level in following:
-        above.append(between(level, finest))
+        above.append(compare_levels(level, finest))
         finest = level
     return detail_of(coarsest, above), finest
 

@@ -24,7 +24,7 @@ from ptmtools.texture import (
     write_image,
 )
 from ptmtools.texture.images.floats import floats, save_radiance
-from ptmtools.texture.images.picture import oriented
+from ptmtools.texture.images.picture import orient
 from ptmtools.texture.images.png import png_bytes
 from tests.texture.coding import same
 from tests.texture.files import chunk, png, saved
@@ -118,7 +118,7 @@ def test_a_large_tiff_has_several_strips(tmp_path: Path) -> None:
     texels = random("u2", 3, (700, 500))
     write_image(tmp_path / "a.tif", texels, Description(icc=b"profile", orientation=6))
     picture = load_image(tmp_path / "a.tif")
-    same(picture.array(), np.ascontiguousarray(oriented(texels, 6)))
+    same(picture.array(), np.ascontiguousarray(orient(texels, 6)))
     assert picture.description == Description(icc=b"profile")
 
 

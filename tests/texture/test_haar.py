@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ptmtools.texture.coders import haar
-from ptmtools.texture.coders.group import Reader
+from ptmtools.texture.coders.group import GroupReader
 from ptmtools.texture.pyramid import mean_below
 from tests.texture.coding import textured
 from tests.texture.oracles.haar import decode_haar
@@ -44,7 +44,7 @@ def test_the_reference_has_seen_every_mode() -> None:
     below = mean_below(level)
     group = haar.encode(level, below)
     assert group[0] == haar.SENT_WEIGHTS
-    tables = read_tables(Reader(group[1 + 26 :]), 29)
+    tables = read_tables(GroupReader(group[1 + 26 :]), 29)
     assert len({tuple(table) for table in tables}) > 3
     np.testing.assert_array_equal(decode_haar(group, below, level.shape), level)
 

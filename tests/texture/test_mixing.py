@@ -160,7 +160,7 @@ def test_no_entry_of_a_table_is_in_doubt(monkeypatch):
         margins.append(np.abs(values % 1 - 0.5).min())
         return np.rint(values).astype(np.int32)
 
-    monkeypatch.setattr(tables, "_rounded", recorded)
+    monkeypatch.setattr(tables, "_round", recorded)
     for table in (tables.squash, tables.magnitude):
         table.__wrapped__()
     tables.soft_plus()

@@ -21,7 +21,7 @@ from ptmtools.texture.previews import (
     WORTH,
     PreviewOptions,
     Pyramid,
-    decoded_preview,
+    decode_preview,
 )
 from ptmtools.texture.steps import EncodedSteps, encode_steps
 
@@ -67,7 +67,7 @@ def test_every_preview_is_of_its_level(width: int, height: int, components: int)
     assert encoded.steps.previews
     for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True):
         level = exact[preview.level]
-        image = decoded_preview(data, components)
+        image = decode_preview(data, components)
         assert image.shape == level.shape == (preview.height, preview.width, components)
         assert len(data) == preview.bytes
         colours = components - (components in (2, 4))
@@ -124,7 +124,7 @@ def test_a_lossy_source_is_its_own_exact_form(
     assert (finest.exact, finest.format, finest.level) == (True, name, 9)
     assert (finest.width, finest.height, finest.difference, finest.error) == (512, 512, 0, 0)
     texels = load_image(source).array()
-    assert np.array_equal(decoded_preview(encoded.previews[-1], 3), texels)
+    assert np.array_equal(decode_preview(encoded.previews[-1], 3), texels)
     beside = len(encoded.ptm) + sum(preview.bytes for preview in between)
     assert beside <= BESIDE * len(source)
     assert {preview.exact for preview in between} == {False}
@@ -166,7 +166,7 @@ def test_previews_of_deep_images_show_the_upper_bits() -> None:
     texels = photograph(128, 128, 3).astype(np.uint16) << 8 | 77
     encoded = encode_steps(Picture(texels), b"", EncodeOptions(), PreviewOptions())
     assert np.array_equal([*decode_levels(encoded.ptm)][-1], texels)
-    shown = decoded_preview(encoded.previews[-1], 3).astype(float)
+    shown = decode_preview(encoded.previews[-1], 3).astype(float)
     assert np.abs(shown - (texels >> 8)).mean() < 20
 
 

@@ -25,7 +25,7 @@ from ptmtools.cli.main import main
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture import EncodeOptions, check, decode, encode, load_image, write_image
 from ptmtools.texture.coder import Tile
-from ptmtools.texture.coders.group import Reader
+from ptmtools.texture.coders.group import GroupReader
 from ptmtools.texture.profiles import PROFILES, Profile
 
 TOY = Profile("toy", 200, "for tests", module=__name__)
@@ -40,7 +40,7 @@ def encode_base(level: NDArray[Any]) -> bytes:
 
 
 def decode_base(data: bytes, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    reader = Reader(data)
+    reader = GroupReader(data)
     flipped = reader.numbers("u1", int(np.prod(shape)) * dtype.itemsize)
     reader.end()
     return (flipped ^ 255).view(dtype).reshape(shape)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture.coders import rans as tables, rans_kernels as kernels
-from ptmtools.texture.coders.group import Reader
+from ptmtools.texture.coders.group import GroupReader
 from ptmtools.texture.coders.rans import Sink, Stream, encode_symbols, read_stream
 from tests.texture.oracles.rans import Symbols, built_in, normalised, read_tables
 
@@ -44,10 +44,10 @@ def test_tables_survive_their_serialised_form(rows: list[list[int]]) -> None:
     for t, row in enumerate(rows):
         counts[7 * t] = row
     frequency, packed = tables.choose(counts, TABLES - 1, tables.built_in())
-    reader = Reader(packed + b"more")
+    reader = GroupReader(packed + b"more")
     np.testing.assert_array_equal(tables.parse(reader, TABLES, tables.built_in()), frequency)
     assert reader.rest() == b"more"
-    reader = Reader(packed)
+    reader = GroupReader(packed)
     assert read_tables(reader, TABLES) == frequency.tolist()
     reader.end()
 
@@ -69,10 +69,10 @@ def coded() -> tuple[Stream, tables.Frequencies, NDArray[np.uint16], NDArray[np.
     counts = np.zeros((4, 256), np.int64)
     np.add.at(counts, (contexts, np.minimum(symbols, tables.ESCAPE)), 1)
     packed, data = encode_symbols(Sink(symbols, contexts, counts), 4, tables.built_in())
-    frequency = tables.parse(Reader(packed), 4, tables.built_in())
-    plain = Symbols(Reader(data), frequency.tolist())
+    frequency = tables.parse(GroupReader(packed), 4, tables.built_in())
+    plain = Symbols(GroupReader(data), frequency.tolist())
     assert [plain.next(int(t)) for t in contexts] == symbols.tolist()
-    return read_stream(Reader(data), 301), frequency, symbols, contexts
+    return read_stream(GroupReader(data), 301), frequency, symbols, contexts
 
 
 def test_symbols_come_back_row_by_row(coded: Any) -> None:
@@ -117,4 +117,4 @@ def test_symbols_come_back_one_by_one(coded: Any) -> None:
 )
 def test_impossible_tables_are_refused(data: bytes) -> None:
     with pytest.raises(InputError, match="PTM-I112"):
-        tables.parse(Reader(data), TABLES, tables.built_in())
+        tables.parse(GroupReader(data), TABLES, tables.built_in())

@@ -16,7 +16,7 @@ import ptmtools.texture as texture
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
 from ptmtools.texture.container import pack_head
-from ptmtools.texture.pyramid import Box, covering, tiles_under
+from ptmtools.texture.pyramid import Box, covering_box, tiles_under
 from tests.memory import little_memory
 
 TILED = EncodeOptions("raw", tile=16)
@@ -167,7 +167,7 @@ def test_what_the_tiles_under_a_window_cover(width: int, height: int, side: int,
     x1, y1 = data.draw(st.integers(x0 + 1, width)), data.draw(st.integers(y0 + 1, height))
     box = Box(x0, y0, x1, y1)
     tiles = [tile for _, tile in tiles_under(width, height, side, box)]
-    assert covering(width, height, side, box) == (
+    assert covering_box(width, height, side, box) == (
         min(t.x0 for t in tiles), min(t.y0 for t in tiles),
         max(t.x1 for t in tiles), max(t.y1 for t in tiles),
     )  # fmt: skip

@@ -183,11 +183,11 @@ def test_tokens_cover_every_number_once() -> None:
 def test_halves_and_singles_as_integers(pattern: int, value: float) -> None:
     half = np.array([pattern], np.uint16).view(np.float16)
     number = int(to_ordered(half)[0])
-    np.testing.assert_equal(kernels.real(number, kernels.HALF), np.float64(half[0]))
+    np.testing.assert_equal(kernels.float_value(number, kernels.HALF), np.float64(half[0]))
     for dtype, kind in zip(FLOATS, (kernels.HALF, kernels.SINGLE), strict=True):
         rounded = round_to(np.array([value]), dtype)
-        assert int(kernels.ordered(value, kind)) == int(to_ordered(rounded)[0])
-        again = kernels.real(int(to_ordered(rounded)[0]), kind)
+        assert int(kernels.ordered_value(value, kind)) == int(to_ordered(rounded)[0])
+        again = kernels.float_value(int(to_ordered(rounded)[0]), kind)
         np.testing.assert_equal(again, np.float64(rounded[0]))
 
 

@@ -48,11 +48,11 @@ class ReadPicture(NamedTuple):
 def read_picture(data: bytes, format: str, limits: Limits, at: Place) -> ReadPicture | None:
     """Decodes an image of a format that Pillow names so; None with PTM-D710 if it is none."""
     from ptmtools.texture import load_image
-    from ptmtools.texture.images.opening import opened, pillow_faults
+    from ptmtools.texture.images.opening import open_image, pillow_faults
 
     try:
         with pillow_faults():
-            image = opened(io.BytesIO(data), limits)
+            image = open_image(io.BytesIO(data), limits)
         if image.format == format:
             load_image(data, limits)
             return ReadPicture(image.size, len(data))

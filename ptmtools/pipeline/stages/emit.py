@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
-    from ptmtools.texture.sources import Source
+    from ptmtools.texture.sources import PtmSource
 
 
 class EmissionJob(Job):
@@ -136,7 +136,7 @@ def read_records(
     def read(name: str) -> bytes:
         return db.read_output(stage.name, name)
 
-    def source(name: str) -> Source:
+    def source(name: str) -> PtmSource:
         return db.source(name, db.output(stage.name, name))
 
     def one(file: tuple[str, Mapping[str, int]]) -> TextureRecord:

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader
     from ptmtools.texture.previews import Steps
-    from ptmtools.texture.sources import Source
+    from ptmtools.texture.sources import PtmSource
 
 #: Objects that are sent, and textures that are fetched, at a time.
 OBJECTS_AHEAD = 8
@@ -114,7 +114,7 @@ def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
 def _sizes(artifacts: Artifacts, options: TextureOptions) -> list[tuple[int, int]]:
     """(width, height) of the scene's images. In a dry run, an image that is not in the database yet
     counts as one texel: it will be encoded in any case."""
-    from ptmtools.texture.images.opening import opened, pillow_faults
+    from ptmtools.texture.images.opening import open_image, pillow_faults
     from ptmtools.texture.model import Limits
 
     outputs = artifacts.record(SCENE).outputs
@@ -124,7 +124,7 @@ def _sizes(artifacts: Artifacts, options: TextureOptions) -> list[tuple[int, int
         if f"{IMAGES}/{image.sha256}" in outputs:
             with naming(image.name), pillow_faults():
                 file = io.BytesIO(image.load())
-                width, height = opened(file, Limits(options.limit << 20)).size
+                width, height = open_image(file, Limits(options.limit << 20)).size
         sizes.append((width, height))
     return sizes
 
@@ -404,7 +404,10 @@ class TexturesJob(Job):
 
 
 def stored_texture(
-    artifacts: Artifacts, name: str, source: Callable[[str], Source], read: Callable[[str], bytes]
+    artifacts: Artifacts,
+    name: str,
+    source: Callable[[str], PtmSource],
+    read: Callable[[str], bytes],
 ) -> Stored:
     """The texture of a `.ptm`; ``source`` and ``read`` open files of the database."""
     ptm, steps = f"{SERVED}/{name}", steps_file(stem_of(name))
@@ -443,7 +446,7 @@ def notes_on_size(textures: Iterable[Stored], most: int) -> Iterator[str]:
         )
 
 
-def header_of(source: Source) -> PtmHeader:
+def header_of(source: PtmSource) -> PtmHeader:
     """The header of a `.ptm`; raises as `ranges_of` and `read_header`."""
     from ptmtools.texture.container import HEAD_MAX, read_header
     from ptmtools.texture.sources import first_bytes

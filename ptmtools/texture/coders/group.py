@@ -1,11 +1,12 @@
 """Reading and writing the bytes of a group, shared by all coders.
 
-- `Reader` bounds every read; `damaged` is the error for bytes that no encoder writes.
+- `GroupReader` bounds every read; `group_error` is the error for bytes that no encoder writes.
 - The components of a texel are coded as *planes*: green, red, blue, alpha; grey and alpha. Red
   refers to green, blue to both, the others to none.
 - A coarsest level of any size is coded as the pyramid of its own: levels in one string of bytes,
   each with its length in four bytes before it.
-- `fitted` solves weighted least squares without rounding, so that every machine gets the same.
+- `solve_normal_equations` solves weighted least squares without rounding, the same on every
+  machine.
 - Deflated groups of files of version 1 are read and no longer written: the group of `raw` or, for
   each 2×2 block, p - I, q - I and r - I modulo 256 and the remainder of the sum. Deflate made the
   bytes of a file depend on the zlib that wrote it; `repeats` has taken its place.
@@ -25,7 +26,7 @@ from ptmtools.texture.coder import Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.pyramid import level_sizes
 
 
-def damaged(what: str) -> InputError:
+def group_error(what: str) -> InputError:
     """The error for a group whose contents contradict each other."""
     return InputError(
         "PTM-I112",
@@ -34,7 +35,7 @@ def damaged(what: str) -> InputError:
     )
 
 
-class Reader:
+class GroupReader:
     """Bytes from the front; asking for more than there are raises InputError PTM-I112."""
 
     def __init__(self, data: Data) -> None:
@@ -43,7 +44,7 @@ class Reader:
     def take(self, size: int) -> memoryview:
         """The next ``size`` bytes, not copied."""
         if size > len(self._left):
-            raise damaged("it is cut short")
+            raise group_error("it is cut short")
         taken, self._left = self._left[:size], self._left[size:]
         return taken
 
@@ -59,7 +60,7 @@ class Reader:
             number |= (byte & 127) << shift
             if byte < 128:
                 return number
-        raise damaged("a number is too long")
+        raise group_error("a number is too long")
 
     def numbers(self, dtype: str, count: int) -> NDArray[Any]:
         """The next (count,) numbers of a little-endian type, copied."""
@@ -78,7 +79,7 @@ class Reader:
     def end(self) -> None:
         """Raise InputError PTM-I112 if anything is left."""
         if self._left:
-            raise damaged(f"{len(self._left)} bytes are left over")
+            raise group_error(f"{len(self._left)} bytes are left over")
 
 
 def pack_varints(*numbers: int) -> bytes:
@@ -97,7 +98,7 @@ def plane_order(components: int) -> NDArray[np.int64]:
     return np.array([1, 0, 2, 3][:components] if components > 2 else range(components), np.int64)
 
 
-def references(components: int) -> NDArray[np.int64]:
+def reference_counts(components: int) -> NDArray[np.int64]:
     """How many of the planes coded first each plane (c,) refers to."""
     return np.array([0, 1, 2, 0][:components] if components > 2 else [0] * components, np.int64)
 
@@ -118,7 +119,7 @@ def pack_levels(
 
 
 def unpack_levels(
-    decode_tile: Callable[..., Tile], reader: Reader, below: Samples, shapes: Iterable[Shape]
+    decode_tile: Callable[..., Tile], reader: GroupReader, below: Samples, shapes: Iterable[Shape]
 ) -> Samples:
     """The last of the levels of `pack_levels`, which have these shapes.
 
@@ -139,7 +140,7 @@ def shapes_to(shape: Shape) -> list[Shape]:
     return [(h, w, components) for w, h in level_sizes(width, height)]
 
 
-def fitted(
+def solve_normal_equations(
     sums: NDArray[np.float64], bits: int, top: int, ridge: int, share: int
 ) -> NDArray[np.int64]:
     """Weights (m,) in 1/2^bits, within ± ``top``, that solve normal equations.
@@ -155,8 +156,8 @@ def fitted(
     for i, row in enumerate(rows):
         row[i] += (row[i] >> share) + ridge
     numerators, determinant = bareiss(rows)
-    one = 2 << bits
-    solution = [(one * n + determinant) // (2 * determinant) for n in numerators]
+    unit = 2 << bits
+    solution = [(unit * n + determinant) // (2 * determinant) for n in numerators]
     return np.clip(solution, -top, top).astype(np.int64)
 
 
@@ -192,9 +193,9 @@ def inflate(data: Data, length: int) -> bytes:
     try:
         out = unpacker.decompress(data, length + 1)
     except zlib.error as error:
-        raise damaged(f"its deflated data is invalid ({error})") from None
+        raise group_error(f"its deflated data is invalid ({error})") from None
     if len(out) != length or not unpacker.eof or unpacker.unused_data:
-        raise damaged(f"its deflated data does not hold {length} bytes")
+        raise group_error(f"its deflated data does not hold {length} bytes")
     return out
 
 

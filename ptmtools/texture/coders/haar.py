@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coder import Data, Shape
 from ptmtools.texture.coders import haar_kernels as kernels, rans as tables
-from ptmtools.texture.coders.group import Reader, damaged, plane_order, references
+from ptmtools.texture.coders.group import GroupReader, group_error, plane_order, reference_counts
 from ptmtools.texture.coders.haar_layout import (
     ACTIVITY_WEIGHTS,
     BUILT_IN_WEIGHTS,
@@ -61,23 +61,23 @@ def decode(data: Data, below: Bytes, shape: Shape, version_1: bool = False) -> B
     Raises InputError PTM-I112 for what no encoder writes.
     """
     components = shape[2]
-    reader = Reader(data)
+    reader = GroupReader(data)
     flags = reader.number(1)
     if flags & ~(SENT_WEIGHTS | RANKED * ((1 << components) - 1)):
-        raise damaged(f"flags {flags} are unknown")
+        raise group_error(f"flags {flags} are unknown")
     sets = []
     for c in range(components):
         bitmap = reader.numbers("u1", 32 if flags & RANKED << c else 0)
         sets.append(np.flatnonzero(np.unpackbits(bitmap, bitorder="little")))
         if bitmap.size and len(sets[c]) < 2:
-            raise damaged("a rank bitmap has fewer than two values")
+            raise group_error("a rank bitmap has fewer than two values")
     sent = None
     if flags & SENT_WEIGHTS:
         mask = sent_mask(components)
         sent = np.zeros(mask.shape, np.int32)
         sent[mask] = reader.numbers("<i2", int(mask.sum()))
         if int(np.abs(sent).max()) > WEIGHT_TOP:
-            raise damaged("a weight is out of range")
+            raise group_error("a weight is out of range")
     frequency = tables.parse(reader, TABLES, tables.built_in(), version_1)
     level = np.empty(shape, np.uint8)
     edge = level.size - 4 * below.size
@@ -85,7 +85,7 @@ def decode(data: Data, below: Bytes, shape: Shape, version_1: bool = False) -> B
     table, begins = tables.row_tables(frequency)
     classes = class_of_activity()
     ranks = _Ranks(sets)
-    source = kernels.Source(
+    source = kernels.HaarSource(
         words=stream.words,
         limit=stream.limit,
         escapes=stream.escapes,
@@ -125,7 +125,7 @@ def _sparse_values(blocks: Bytes) -> Sets:
     components = blocks.shape[2]
     used = np.zeros((components, 256), np.uint8)
     kernels.mark_values(blocks, used)
-    sets = [np.flatnonzero(one) for one in used]
+    sets = [np.flatnonzero(occurs) for occurs in used]
     samples = blocks.size // components
     for c, values in enumerate(sets):
         few = 2 <= len(values) <= samples // 64
@@ -140,11 +140,11 @@ def _pass(
     sent: NDArray[np.int32] | None,
     ranks: _Ranks,
     sink: Sink | None,
-    source: kernels.Source | None,
+    source: kernels.HaarSource | None,
 ) -> int:
     """Calls `haar_kernels.haar_pass`."""
     components = level.shape[2]
-    others = references(components)
+    others = reference_counts(components)
     return kernels.haar_pass(
         level,
         below,

@@ -39,9 +39,9 @@ def read_differences(level: Any, plane: int, y: int, rank: Any, v: Any, h: Any, 
     upper, lower = level[2 * y], level[2 * y + 1]
     c = np.uint64(plane)
     for x in range(v.size - 2):
-        left, right = np.uint64(2 * x), np.uint64(2 * x + 1)
-        p, q = rank[np.uint64(upper[left, c])], rank[np.uint64(upper[right, c])]
-        r, s = rank[np.uint64(lower[left, c])], rank[np.uint64(lower[right, c])]
+        even, odd = np.uint64(2 * x), np.uint64(2 * x + 1)
+        p, q = rank[np.uint64(upper[even, c])], rank[np.uint64(upper[odd, c])]
+        r, s = rank[np.uint64(lower[even, c])], rank[np.uint64(lower[odd, c])]
         v[x + 1] = i32(p + q - r - s)
         h[x + 1] = i32(p - q)
         g[x + 1] = i32(r - s) >> 1
@@ -87,16 +87,16 @@ def rebuild_ranked(
         dp = (dr + vx + hx) >> 1
         dq = dp - hx
         least = max(0, -min(dp, dq, dr))
-        most = top - max(0, max(dp, dq, dr))
-        if least > most:
+        highest = top - max(0, max(dp, dq, dr))
+        if least > highest:
             upper[x] = lower[x] = 0
             stray = 1
             continue
         wanted = 4 * np.int64(below[x, plane])
         u = rank[below[x, plane]] - ((dp + dq + dr + 2) >> 2)
-        u = min(max(u, least), most)
+        u = min(max(u, least), highest)
         total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
-        while total < wanted and u < most:
+        while total < wanted and u < highest:
             u += 1
             total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
         while total > wanted + 3 and u > least:
@@ -157,7 +157,7 @@ i32, u16 = np.int32, np.uint16
 MANY_VALUES = 225
 
 
-class Workspace(NamedTuple):
+class HaarWorkspace(NamedTuple):
     """Scratch arrays of a pass, allocated outside, so that no compiled code allocates.
 
     Coefficients are numbered: V, h1, h2'. Pairs of rows are block row y and block row y - 1.
@@ -172,7 +172,7 @@ class Workspace(NamedTuple):
     activity: Any  # (blocks,) int32
 
 
-class Source(NamedTuple):
+class HaarSource(NamedTuple):
     """A decoder's source of symbols, and the tables that turn them into texels."""
 
     words: Any  # uint16, the stream, with a row's length and 8 more of padding behind `limit`
@@ -191,10 +191,10 @@ class Source(NamedTuple):
     mixed: Any  # (c * blocks,) uint16
 
 
-def workspace(blocks: int, components: int) -> Workspace:
+def workspace(blocks: int, components: int) -> HaarWorkspace:
     """Allocates the workspace of groups ``blocks`` wide."""
     wide = blocks + 2
-    return Workspace(
+    return HaarWorkspace(
         rows=np.zeros((components, 8, blocks + 4), i32),
         gradient=np.zeros((components, 2, blocks), i32),
         differences=np.zeros((3, components, 2, wide), i32),
@@ -251,11 +251,11 @@ def _edge_prediction(level: Any, y: int, x: int, plane: int) -> Any:
     inside."""
     if x == 0:
         return i32(level[y - 1, x, plane]) if y > 0 else i32(0)
-    left = i32(level[y, x - 1, plane])
+    west = i32(level[y, x - 1, plane])
     if y == 0:
-        return left
-    up, corner = i32(level[y - 1, x, plane]), i32(level[y - 1, x - 1, plane])
-    return max(min(left, up), min(max(left, up), i32(left + up - corner)))
+        return west
+    north, corner = i32(level[y - 1, x, plane]), i32(level[y - 1, x - 1, plane])
+    return max(min(west, north), min(max(west, north), i32(west + north - corner)))
 
 
 @kernel

@@ -3,7 +3,8 @@
 The built-in weights and the classes of activity were fitted once to photographs (12 of the Kodak
 images and 7 textures) and are part of the format. An encoder may send weights of its own, fitted to
 one group: weighted least squares over a sample of block rows, one system of at most seven unknowns
-for each plane and Haar difference, solved exactly (`group.fitted`); the decoder only reads them.
+for each plane and Haar difference, solved exactly (`group.solve_normal_equations`); the decoder
+only reads them.
 
 With the built-in weights alone, photographs grow by 1.5 % and other textures by 10.7 % (normal maps
 most: their components are correlated differently).
@@ -16,7 +17,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.group import fitted, plane_order, references
+from ptmtools.texture.coders.group import plane_order, reference_counts, solve_normal_equations
 
 #: Weights are in 1/256 and stay within ± this, so that predictions fit in 32 bits.
 WEIGHT_TOP = 2047
@@ -58,7 +59,7 @@ def sent_mask(components: int) -> NDArray[np.bool_]:
     """Which weights (c, 3, 7) are sent, in this order."""
     mask = np.zeros((components, 3, 7), np.bool_)
     mask[:, :, :4] = mask[:, 2, 4] = True
-    for c, others in enumerate(references(components)):
+    for c, others in enumerate(reference_counts(components)):
         mask[c, :, 5 : 5 + others] = True
     return mask
 
@@ -97,17 +98,17 @@ def fit_weights(
     rows = below[around], level[np.stack([2 * y, 2 * y + 1, 2 * around[3]]), : 2 * bw]
     weights, sent = np.zeros((nc, 3, 7), np.int32), sent_mask(nc)
     residuals = np.zeros((nc, 3, len(y), bw), np.int32)
-    for c, (plane, others) in enumerate(zip(plane_order(nc), references(nc), strict=True)):
-        means, texels = (ranks[plane].take(one[..., plane]) for one in rows)
+    for c, (plane, others) in enumerate(zip(plane_order(nc), reference_counts(nc), strict=True)):
+        means, texels = (ranks[plane].take(rank_rows[..., plane]) for rank_rows in rows)
         for k, (coefficient, terms) in enumerate(_coefficients(means, texels)):
             samples = np.stack([*terms, *residuals[:others, k], coefficient], dtype=np.float64)
             samples = samples.reshape(-1, coefficient.size)
             features = samples[:-1]
             # Whole numbers, the sums of their products below 2^50.
             weighted = features * _SLOPE_WEIGHTS.take(np.abs(terms[0])).reshape(-1)
-            own = fitted(weighted @ samples.T, 8, WEIGHT_TOP, ridge=4096, share=16)
-            weights[c, k, sent[c, k]] = own
-            predicted = np.floor((own @ features + 128) / 256)
+            fit = solve_normal_equations(weighted @ samples.T, 8, WEIGHT_TOP, ridge=4096, share=16)
+            weights[c, k, sent[c, k]] = fit
+            predicted = np.floor((fit @ features + 128) / 256)
             residuals[c, k] = coefficient - predicted.reshape(coefficient.shape)
     return weights
 

@@ -6,7 +6,8 @@ needs strip i - 1 of the same and strip i + 1 of the plane before it, so the pla
 other in a pipeline, on as many threads as there are planes. Where the height is odd, one plane runs
 after the other.
 
-The state that the coder learns (`State`) starts the same for every plane and is copied for tiles.
+The state that the coder learns (`PlaneState`) starts the same for every plane and is copied for
+tiles.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coder import PLAIN, Coding, Data, Shape
 from ptmtools.texture.coders import mixing_decisions as decisions, mixing_strips as strips
-from ptmtools.texture.coders.group import Reader, damaged, pack_varints, plane_order
+from ptmtools.texture.coders.group import GroupReader, group_error, pack_varints, plane_order
 from ptmtools.texture.coders.mixing_decisions import BATCH, FEATURES, LOGIT_TOP, SAMPLE, SQUASH
 from ptmtools.texture.coders.mixing_strips import (
     MAGNITUDE,
@@ -27,9 +28,9 @@ from ptmtools.texture.coders.mixing_strips import (
     POSITIONS,
     SECOND,
     Canvas,
-    Place,
-    State,
-    Tables,
+    LevelTables,
+    PlaneLayout,
+    PlaneState,
 )
 
 #: Slots of a hashed context, entries of a match: powers of two, by the number of texels.
@@ -38,14 +39,14 @@ VALUE_BITS = (8, 18)
 
 
 #: The state of all planes behind a level. Coding changes it in place: give it a copy.
-Memory = tuple[State, ...]
+Memory = tuple[PlaneState, ...]
 
 
-def copied(memory: Memory) -> Memory:
-    return tuple(State(*(array.copy() for array in state)) for state in memory)
+def copy_memory(memory: Memory) -> Memory:
+    return tuple(PlaneState(*(array.copy() for array in state)) for state in memory)
 
 
-def fresh_state() -> State:
+def fresh_state() -> PlaneState:
     """The state of a plane before anything is coded."""
     # A context's level of magnitude is that of a sum of nine residuals: its lowest, and a bit more.
     lowest = np.searchsorted(MAGNITUDE, np.arange(MAGNITUDES))
@@ -56,7 +57,7 @@ def fresh_state() -> State:
     cells = SQUASH[np.minimum(np.arange(decisions.CELLS) * 256, 2 * LOGIT_TOP)]
     chances = np.full(decisions.CHANCES, 49152, np.int32)
     chances[: decisions.TRUST] = np.tile(cells, decisions.NODE_ROWS)
-    return State(
+    return PlaneState(
         normal=np.zeros((POSITIONS, FEATURES, FEATURES)),
         pending=np.zeros((POSITIONS, BATCH, SAMPLE), np.int32),
         weights=np.zeros((POSITIONS, FEATURES), np.int32),
@@ -69,18 +70,18 @@ def fresh_state() -> State:
     )
 
 
-def level_tables(texels: int) -> Tables:
+def level_tables(texels: int) -> LevelTables:
     """Tables learned for one plane of one level of that many ``texels`` and dropped after it."""
     bits = max(texels - 1, 0).bit_length()
     slots = min(max(bits - 1, SLOT_BITS[0]), SLOT_BITS[1])
     values = min(max(bits, VALUE_BITS[0]), VALUE_BITS[1])
-    return Tables(
+    return LevelTables(
         slots=np.zeros((decisions.COUNTERS << slots) * decisions.SLOT, np.uint32),
         values=np.zeros(decisions.MATCHES << values, np.int32),
         notes=np.zeros(decisions.NOTES, np.int64),
         x=np.zeros(decisions.INPUTS, np.int32),
-        left=np.zeros((FEATURES, FEATURES)),
-        right=np.zeros((FEATURES, FEATURES)),
+        weighted=np.zeros((FEATURES, FEATURES)),
+        samples=np.zeros((FEATURES, FEATURES)),
     )
 
 
@@ -115,27 +116,27 @@ def decode_mixing(
 def encode_even(level: Level, below: Level) -> bytes:
     """``level`` as if all blocks with the same mean were equally likely: the coder for noise."""
     stream = _Stream(2 * level.size + 64)
-    _even(level, below, level.shape, stream)
-    return stream.closed()
+    _code_even(level, below, level.shape, stream)
+    return stream.finish()
 
 
 def decode_even(data: Data, below: Level, shape: Shape) -> Level:
     """The inverse of `encode_even`. Raises InputError PTM-I112 for what no encoder writes."""
     stream = _Stream(data)
-    level = _even(None, below, shape, stream)
+    level = _code_even(None, below, shape, stream)
     stream.check()
     return level
 
 
-def _even(level: Level | None, below: Level, shape: tuple[int, ...], stream: _Stream) -> Level:
+def _code_even(level: Level | None, below: Level, shape: tuple[int, ...], stream: _Stream) -> Level:
     height, width, components = shape
-    canvas, places = _canvas(level, below, height, width, list(range(components)))
+    canvas, places = _lay_out(level, below, height, width, list(range(components)))
     for place in places:
         decisions.code_even(
             level is not None, height, width, place, canvas.cells, canvas.parents, canvas.goal,
             _ways(), stream.coder, stream.buffer,
         )  # fmt: skip
-    return _cropped(canvas, places, list(range(components)), shape)
+    return _crop(canvas, places, list(range(components)), shape)
 
 
 @cache
@@ -143,9 +144,9 @@ def _ways() -> NDArray[np.int64]:
     """See `mixing_decisions.code_even`."""
     ways = np.zeros((4, 772), np.int64)
     sums = np.ones(1, np.int64)
-    for left in range(4):
+    for open_texels in range(4):
         ends = np.convolve(sums, np.ones(4, np.int64))
-        ways[left, 1 : 1 + len(ends)] = ends
+        ways[open_texels, 1 : 1 + len(ends)] = ends
         sums = np.convolve(sums, np.ones(256, np.int64))
     return np.cumsum(ways, axis=1)
 
@@ -165,9 +166,9 @@ class _Pass:
         self.shape = shape
         self.order = plane_order(components).tolist()
         self.step = 2 * coding.max_error + 1
-        self.memory = copied(coding.memory or (fresh_state(),) * components)
+        self.memory = copy_memory(coding.memory or (fresh_state(),) * components)
         self.tables = [level_tables(height * width) for _ in range(components)]
-        self.canvas, self.places = _canvas(level, below, height, width, self.order)
+        self.canvas, self.places = _lay_out(level, below, height, width, self.order)
         self.strips = max((width // 2 + STRIP - 1) // STRIP, 1)
         # The planes of a narrow level share one stream: it cannot be a pipeline.
         count = components if self.strips > 1 else 1
@@ -211,15 +212,15 @@ class _Pass:
     def stream(self) -> bytes | None:
         if any(stream.coder[3] > stream.buffer.size for stream in self.streams):
             return None
-        parts = [stream.closed() for stream in self.streams]
+        parts = [stream.finish() for stream in self.streams]
         return b"".join([pack_varints(*map(len, parts[:-1])), *parts])
 
     def texels(self) -> Level:
-        return _cropped(self.canvas, self.places, self.order, self.shape)
+        return _crop(self.canvas, self.places, self.order, self.shape)
 
 
-def _cropped(
-    canvas: Canvas, places: list[Place], order: list[int], shape: tuple[int, ...]
+def _crop(
+    canvas: Canvas, places: list[PlaneLayout], order: list[int], shape: tuple[int, ...]
 ) -> Level:
     height, width, components = shape
     level = np.empty(shape, np.uint8)
@@ -228,9 +229,9 @@ def _cropped(
     return level
 
 
-def _canvas(
+def _lay_out(
     level: Level | None, below: Level, height: int, width: int, order: list[int]
-) -> tuple[Canvas, list[Place]]:
+) -> tuple[Canvas, list[PlaneLayout]]:
     """Planes with a border of 2 blocks, 3 to the right and below: parents are repeated there."""
     if below.size == 0:
         below = np.full((max(height >> 1, 1), max(width >> 1, 1), len(order)), 128, np.uint8)
@@ -253,7 +254,7 @@ def _canvas(
             step = across if row == 1 else stride
             offsets[row, k, : len(near)] = [dy * step + dx for dy, dx in near]
     places = [
-        Place(
+        PlaneLayout(
             texels=c * size + PAD * stride + PAD,
             parents=c * size // 4 + PAD // 2 * across + PAD // 2,
             stride=stride,
@@ -279,7 +280,7 @@ class _Stream:
         window = int.from_bytes(self.buffer[:first].tobytes().ljust(4, b"\0"), "big")
         self.coder = np.array([0, 0xFFFFFFFF, window, first], np.int64)
 
-    def closed(self) -> bytes:
+    def finish(self) -> bytes:
         """The bytes written."""
         value, size = self._final()
         return self.buffer[: int(self.coder[3])].tobytes() + value.to_bytes(4, "big")[:size]
@@ -288,7 +289,7 @@ class _Stream:
         """Raise InputError PTM-I112 unless all was read."""
         value, size = self._final()
         if self.coder[2] != value or self.coder[3] - 4 + size != self.buffer.size:
-            raise damaged("its stream does not end with its last texel")
+            raise group_error("its stream does not end with its last texel")
 
     def _final(self) -> tuple[int, int]:
         """The value in low … high that needs the fewest bytes if zeros follow, and how many."""
@@ -303,6 +304,6 @@ class _Stream:
 
 def _split(data: Data, streams: int) -> list[memoryview]:
     """Lengths of all streams but the last, then the streams."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     lengths = [reader.varint() for _ in range(streams - 1)]
     return [*(reader.take(length) for length in lengths), reader.rest()]

@@ -140,7 +140,7 @@ def code_bit(encoding: bool, bit: int, p: int, coder: Any, buffer: Any) -> Any:
 
 
 @plain_kernel
-def counted(counter: Any, bit: int, top: int) -> Any:
+def update_counter(counter: Any, bit: int, top: int) -> Any:
     """The counter after ``bit``."""
     n = wide(counter) & 1023
     p = wide(counter) >> 10
@@ -154,7 +154,7 @@ def decide_flat(encoding: bool, bit: int, flat: Any, context: int, coder: Any, b
     """Whether a block equals its parent: a counter of its own, no mixing."""
     p = min(max(wide(flat[context]) >> 16, 1), 65535)
     bit = code_bit(encoding, bit, p, coder, buffer)
-    flat[context] = counted(flat[context], bit, FLAT_COUNT_TOP)
+    flat[context] = update_counter(flat[context], bit, FLAT_COUNT_TOP)
     return bit
 
 
@@ -196,9 +196,9 @@ def decide(
 
     bit = code_bit(encoding, bit, p, coder, buffer)
 
-    one = bit << 16
-    ea = i32(((one - SQUASH[za + LOGIT_TOP]) * MIX_RATE) >> 6)
-    eb = i32(((one - SQUASH[zb + LOGIT_TOP]) * MIX_RATE) >> 6)
+    target = bit << 16
+    ea = i32(((target - SQUASH[za + LOGIT_TOP]) * MIX_RATE) >> 6)
+    eb = i32(((target - SQUASH[zb + LOGIT_TOP]) * MIX_RATE) >> 6)
     for i in range(INPUTS):
         wa = i32(mix[node_row, i] + (i32(i32(ea * x[i]) + i32(8192)) >> 14))
         wb = i32(mix[near_row, i] + (i32(i32(eb * x[i]) + i32(8192)) >> 14))
@@ -208,7 +208,7 @@ def decide(
     chances[cell] += ((bit * 65535 - chances[cell]) * 5) >> 8
     for i in range(COUNTERS):
         at = np.uint64(notes[SLOTS + i] + place)
-        slots[at] = counted(slots[at], bit, COUNT_TOP)
+        slots[at] = update_counter(slots[at], bit, COUNT_TOP)
     for i in range(MATCHES):
         if notes[FOUND + i] >= 0:
             e = notes[EXPECTED + i]
@@ -241,13 +241,13 @@ def code_even(
             rest = 4 * parents[place.parents + by * place.across + bx]
             for k in range(4):
                 t = place.texels + (2 * by + (k >> 1)) * place.stride + 2 * bx + (k & 1)
-                left = 3 - k
-                low, high = max(rest - 255 * left, 0), min(rest + 3, 255)
+                open_texels = 3 - k
+                low, high = max(rest - 255 * open_texels, 0), min(rest + 3, 255)
                 while low < high:
                     d = (low + high + 1) >> 1
-                    nothing = ways[left, max(rest - high, -3) + 3]
-                    upper = ways[left, rest - d + 4] - nothing
-                    total = ways[left, rest - low + 4] - nothing
+                    nothing = ways[open_texels, max(rest - high, -3) + 3]
+                    upper = ways[open_texels, rest - d + 4] - nothing
+                    total = ways[open_texels, rest - low + 4] - nothing
                     p = min(max(upper * 65536 // max(total, 1), 1), 65535)
                     bit = 1 if goal[t] >= d else 0
                     if code_bit(encoding, bit, p, coder, buffer):
@@ -291,12 +291,13 @@ WEIGHT_TOP = 4 << WEIGHT_BITS
 @inlined_kernel
 def learn(
     normal: Any, pending: Any, weights: Any, seen: Any, k: int, features: int,
-    left: Any, right: Any,
+    weighted: Any, samples: Any,
 ) -> None:  # fmt: skip
     """One more sample of model k lies at the end of ``pending[k]``: count it; solve if it is time.
 
     normal: (models, 24, 24) float64; pending: (models, 16, 25) int32; weights: (models, 24) int32;
-    seen: (models, 2) int64, all samples and those pending; left, right: (24, 24) float64 scratch.
+    seen: (models, 2) int64, all samples and those pending; weighted, samples: (24, 24) float64,
+    scratch.
     """
     seen[k, 0] += 1
     seen[k, 1] += 1
@@ -305,32 +306,33 @@ def learn(
     if count < (EARLY_BATCH if early else BATCH):
         return
     seen[k, 1] = 0
-    _accumulate(normal[k], pending[k], count, early, features, left, right)
+    _accumulate(normal[k], pending[k], count, early, features, weighted, samples)
     if seen[k, 0] < OFTEN or seen[k, 0] % (2 * BATCH) == 0:
-        _solve(normal[k], weights[k], features, left, right[0])
+        _solve(normal[k], weights[k], features, weighted, samples[0])
 
 
 @inlined_kernel
 def _accumulate(
-    A: Any, pending: Any, count: int, early: bool, features: int, left: Any, right: Any
+    A: Any, pending: Any, count: int, early: bool, features: int, weighted: Any, samples: Any
 ) -> None:
     """A += Σ ω f fᵀ over the pending samples, on and above the diagonal."""
     for n in range(count):
         w = float(pending[n, FEATURES])
         for i in range(FEATURES):
             f = float(pending[n, i])
-            right[n, i] = f
-            left[n, i] = f * w
+            samples[n, i] = f
+            weighted[n, i] = f * w
     forget = 0.0 if early else FORGET
     for i in range(features):
         row = A[i]
         for j in range(FEATURES):
             row[j] -= np.floor(row[j] * forget)
         for n in range(0, count, 4):
-            t0, t1, t2, t3 = left[n, i], left[n + 1, i], left[n + 2, i], left[n + 3, i]
+            t0, t1 = weighted[n, i], weighted[n + 1, i]
+            t2, t3 = weighted[n + 2, i], weighted[n + 3, i]
             for j in range(FEATURES):
-                row[j] += (t0 * right[n, j] + t1 * right[n + 1, j]) + (
-                    t2 * right[n + 2, j] + t3 * right[n + 3, j]
+                row[j] += (t0 * samples[n, j] + t1 * samples[n + 1, j]) + (
+                    t2 * samples[n + 2, j] + t3 * samples[n + 3, j]
                 )
 
 

@@ -64,7 +64,7 @@ def _halves(length: int, boundary: int, inverse: int) -> Any:
 
 
 @inlined_kernel
-def _quantised(e: int, step: int) -> Any:
+def _quantise(e: int, step: int) -> Any:
     """e / step, rounded, halves away from 0 (there are none: steps are odd)."""
     if step == 1:
         return e
@@ -86,11 +86,11 @@ def code_residual(
     if lo >= hi:
         return lo
     origin = lo if last else m
-    g = _quantised(goal - origin, step)
+    g = _quantise(goal - origin, step)
     off = origin * 256 - mu
     half, span = step * 128, step * 256
     phase, kind, node, sign, d = 0, 0, 0, 1, 0
-    bucket, path, most, below, above = 0, 0, 0, 0, 0
+    bucket, path, limit, below, above = 0, 0, 0, 0, 0
     low, high = 0, 0
     group = 0
     open_slots(0, notes, slots, mask)
@@ -141,7 +141,7 @@ def code_residual(
             open_slots(group, notes, slots, mask)
         bit = _answer(phase, g, sign, d)
         for i in range(MATCHES):
-            e = _quantised(notes[FOUND + i] - origin, step)
+            e = _quantise(notes[FOUND + i] - origin, step)
             notes[EXPECTED + i] = _answer(phase, e, sign, d)
 
         bit = decide(
@@ -157,7 +157,7 @@ def code_residual(
             path = 2 * path + 1 + bit
         elif phase == 2:
             bucket += bit
-            if bit == 0 or BUCKETS[bucket + 1] > most:
+            if bit == 0 or BUCKETS[bucket + 1] > limit:
                 phase = 3
         elif phase == 0 and bit:
             return m
@@ -167,10 +167,10 @@ def code_residual(
         else:
             sign = (1 if bit else -1) if phase == 1 else (1 if m < hi else -1)
             high = high if sign > 0 else low
-            most = _quantised(hi - m if sign > 0 else m - lo, step)
-            phase = 2 if BUCKETS[1] <= most else 3
+            limit = _quantise(hi - m if sign > 0 else m - lo, step)
+            phase = 2 if BUCKETS[1] <= limit else 3
         if phase == 3 and path == 0:
-            kind, below, above = 2, BUCKETS[bucket], min(BUCKETS[bucket + 1] - 1, most)
+            kind, below, above = 2, BUCKETS[bucket], min(BUCKETS[bucket + 1] - 1, limit)
         if phase >= 3 and below >= above:
             return min(max(origin + sign * below * step, 0), 255)
 

@@ -90,7 +90,7 @@ class Canvas(NamedTuple):
     offsets: Any  # (3, 5, 8) int64: `TEXELS_AT`, `PARENTS_AT`, `COLOUR_AT` as flat offsets
 
 
-class Place(NamedTuple):
+class PlaneLayout(NamedTuple):
     """Where a plane lies in the flat arrays."""
 
     texels: int  # of its first texel, padding apart
@@ -103,7 +103,7 @@ class Place(NamedTuple):
     before: int  # from a parent to the same of the first reference
 
 
-class State(NamedTuple):
+class PlaneState(NamedTuple):
     """The state that a plane learns over the levels; arrays are changed in place."""
 
     normal: Any  # (5, 24, 24) float64: see `mixing_decisions`
@@ -117,19 +117,19 @@ class State(NamedTuple):
     flat: Any  # (432,) uint32: counters of flat blocks
 
 
-class Tables(NamedTuple):
+class LevelTables(NamedTuple):
     """The state that a plane learns for one level only, and scratch space."""
 
     slots: Any  # (6 * 2^n * 16,) uint32: counters by hashed context
     values: Any  # (3 * 2^n,) int32: last value by hashed context | times confirmed << 8
     notes: Any  # (23,) int64
     x: Any  # (16,) int32
-    left: Any  # (24, 24) float64
-    right: Any  # (24, 24) float64
+    weighted: Any  # (24, 24) float64
+    samples: Any  # (24, 24) float64
 
 
 @plain_kernel
-def _five(e: int) -> Any:
+def _grade(e: int) -> Any:
     """Residual to one of 9 classes: five magnitudes, two signs."""
     a = abs(e)
     return 0 if a == 0 else (1 if e > 0 else 2) + 2 * ((a > 1) + (a > 3) + (a > 8))
@@ -165,13 +165,137 @@ def _gather(
         corner = at - (k >> 1) * place.stride - (k & 1)
         if k < 3:
             under = corner + place.stride
-            here = (cells[corner] + cells[corner + 1] + cells[under] + cells[under + 1]) >> 2
+            mean = (cells[corner] + cells[corner + 1] + cells[under] + cells[under + 1]) >> 2
         else:
-            here = wide(cells[at - 1])
+            mean = wide(cells[at - 1])
         for i in range(COLOUR_COUNT[k]):
-            pending[k, n, count + i] = cells[at + offsets[2, k, i]] - here
+            pending[k, n, count + i] = cells[at + offsets[2, k, i]] - mean
         count += COLOUR_COUNT[k]
     return count
+
+
+@inlined_kernel
+def _locate_matches(
+    notes: Any, values: Any, k: int, t: int, block: int, refs: int, known: int, v1: int, v2: int,
+    place: Any, cells: Any, parents: Any,
+) -> None:  # fmt: skip
+    """Where in ``values`` the matches of a texel lie; v1, v2: of the references."""
+    stride, places = place.stride, values.size // MATCHES
+    w, n = wide(cells[t - 1]), wide(cells[t - stride])
+    nw, ne = wide(cells[t - stride - 1]), wide(cells[t - stride + 1])
+    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)
+    if refs > 0:
+        v1w = wide(cells[t + place.first - 1])
+        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, v1w * 256 + w, 0)
+        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, 0, 0)
+    else:
+        mean = wide(parents[block])
+        east, south = wide(parents[block + 1]), wide(parents[block + place.across])
+        first = t - (k >> 1) * stride - (k & 1)
+        sides = wide(cells[first - 1]) * 256 + cells[first - stride]
+        notes[WHERE + 1] = _hash(17, mean * 65536 + sides, east * 256 + south, k * 131 + known * 4)
+        notes[WHERE + 2] = _hash(27, w * 256 + n, ne, k)
+    for i in range(MATCHES):
+        notes[WHERE + i] = i * places + (notes[WHERE + i] & (places - 1))
+        prefetch(values, notes[WHERE + i])
+
+
+@inlined_kernel
+def _activity(cells: Any, e: int, k: int, stride: int) -> Any:
+    """Weighted sum of the residuals around the one at e."""
+    near = abs(wide(cells[e - stride])) + abs(wide(cells[e - 1]))
+    nw, ne = abs(wide(cells[e - stride - 1])), abs(wide(cells[e - stride + 1]))
+    if k == 0:
+        return 2 * near + nw + ne + abs(cells[e + stride - 1]) + abs(cells[e - 2 * stride])
+    if k == 1:
+        return 2 * near + nw + ne + abs(cells[e - 2]) + abs(cells[e - stride + 2])
+    if k == 3:
+        return 2 * near + 2 * nw + ne
+    return 2 * near + nw + ne + abs(cells[e - 2]) + abs(cells[e - 2 * stride])
+
+
+@inlined_kernel
+def _magnitude_levels(
+    activity: int, t: int, block: int, refs: int, e1: int, e2: int, place: Any, cells: Any,
+    parents: Any,
+) -> Any:  # fmt: skip
+    """The two levels of magnitude, s1 and s2, that choose the scale of the residual."""
+    stride, across = place.stride, place.across
+    if refs == 0:
+        mean = wide(parents[block])
+        slope = (
+            abs(parents[block + 1] - mean) + abs(parents[block + across] - mean)
+            + abs(parents[block - 1] - mean) + abs(parents[block - across] - mean)
+        )  # fmt: skip
+        return _level(activity), _level(2 * slope) >> 1
+    t1 = t + place.first + place.errors
+    reference = 2 * abs(e1) if refs == 1 else abs(e1) + abs(e2)
+    around = (
+        abs(cells[t1 - 1]) + abs(cells[t1 - stride])
+        + abs(cells[t1 + stride]) + abs(cells[t1 + 1])
+    )  # fmt: skip
+    return _level((activity + around) >> 1), _level(2 * reference) >> 1
+
+
+@inlined_kernel
+def _offset(value: int, reference: int, reference_value: int, guess: int) -> Any:
+    """How far a neighbour's value, shifted as the reference shifts, lies from the guess."""
+    return min(max(value + reference - reference_value - guess, -20), 20)
+
+
+@inlined_kernel
+def _note_offsets(
+    notes: Any, k: int, t: int, refs: int, guess: int, size: int, v1: int, v2: int, place: Any,
+    cells: Any,
+) -> None:  # fmt: skip
+    """The contexts of where the neighbours' values lie from the guess."""
+    stride, r1 = place.stride, t + place.first
+    w, n = wide(cells[t - 1]), wide(cells[t - stride])
+    nw, ne = wide(cells[t - stride - 1]), wide(cells[t - stride + 1])
+    if refs == 0:
+        d_w, d_n = _offset(w, 0, 0, guess), _offset(n, 0, 0, guess)
+        d_nw, d_ne = _offset(nw, 0, 0, guess), _offset(ne, 0, 0, guess)
+    else:
+        d_w = _offset(w, v1, cells[r1 - 1], guess)
+        d_n = _offset(n, v1, cells[r1 - stride], guess)
+        if refs == 1:
+            d_nw = _offset(nw, v1, cells[r1 - stride - 1], guess)
+            d_ne = _offset(ne, v1, cells[r1 - stride + 1], guess)
+        else:
+            r2 = t + place.second
+            d_nw = _offset(w, v2, cells[r2 - 1], guess)
+            d_ne = _offset(n, v2, cells[r2 - stride], guess)
+    notes[4] = _hash(90 + k, d_w * 41 + d_n, size >> 2, 0)
+    notes[5] = _hash(110 + k, d_nw * 41 + d_ne, d_w * 41 + d_n, 0)
+
+
+@inlined_kernel
+def _propose(notes: Any, values: Any, lo: int, hi: int) -> Any:
+    """The proposals of the matches within lo … hi; which of the first two have one, how surely."""
+    matched = 0
+    for i in range(MATCHES):
+        entry = wide(values[notes[WHERE + i]])
+        v, times = entry & 255, entry >> 8
+        notes[SURE + i] = times
+        if times == 0 or v < lo or v > hi:
+            v = wide(-1)
+        elif i < 2:
+            matched += (1 if i == 0 else 3) * (2 if times > 3 else 1)
+        notes[FOUND + i] = v
+    return matched
+
+
+@inlined_kernel
+def _confirm(notes: Any, values: Any, v: int) -> None:
+    """The matches learn the value of their texel."""
+    for i in range(MATCHES):
+        at = notes[WHERE + i]
+        entry = wide(values[at])
+        times = entry >> 8
+        if entry & 255 == v and times > 0:
+            values[at] = v | min(times + 1, CONFIRMED - 1) << 8
+        else:
+            values[at] = v | (1 if times < 2 else times >> 2) << 8
 
 
 @inlined_kernel
@@ -182,16 +306,14 @@ def _texel(
 ) -> None:  # fmt: skip
     """Codes texel t, at position k of its block, and learns from it."""
     notes, slots, values = tables_.notes, tables_.slots, tables_.values
-    mask, places = slots.size // (SLOT * COUNTERS) - 1, values.size // MATCHES
-    stride, up = place.stride, block - place.across
+    mask, stride = slots.size // (SLOT * COUNTERS) - 1, place.stride
     mean = wide(parents[block])
     w, n = wide(cells[t - 1]), wide(cells[t - stride])
     nw, ne = wide(cells[t - stride - 1]), wide(cells[t - stride + 1])
     base = mean if k < 3 else w
-    east, south = wide(parents[block + 1]), wide(parents[block + place.across])
-    v1, v2, v1w = wide(0), wide(0), wide(0)
+    v1, v2 = wide(0), wide(0)
     if refs > 0:
-        v1, v1w = wide(cells[t + place.first]), wide(cells[t + place.first - 1])
+        v1 = wide(cells[t + place.first])
     if refs > 1:
         v2 = wide(cells[t + place.second])
 
@@ -208,18 +330,7 @@ def _texel(
         rest = 4 * mean - known
         lo, hi = max(rest - 255 * (3 - k), 0), min(rest + 3, 255)
 
-    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)
-    if refs > 0:
-        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, v1w * 256 + w, 0)
-        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, 0, 0)
-    else:
-        first = t - (k >> 1) * stride - (k & 1)
-        sides = wide(cells[first - 1]) * 256 + cells[first - stride]
-        notes[WHERE + 1] = _hash(17, mean * 65536 + sides, east * 256 + south, k * 131 + known * 4)
-        notes[WHERE + 2] = _hash(27, w * 256 + n, ne, k)
-    for i in range(MATCHES):
-        notes[WHERE + i] = i * places + (notes[WHERE + i] & (places - 1))
-        prefetch(values, notes[WHERE + i])
+    _locate_matches(notes, values, k, t, block, refs, known, v1, v2, place, cells, parents)
     waiting = state.seen[k, 1]
     features = _gather(
         k, t, block, base, refs, place, cells, parents, offsets, state.pending, waiting
@@ -227,40 +338,18 @@ def _texel(
 
     # Residuals around, and those of other planes here.
     e = t + place.errors
-    ew, en = wide(cells[e - 1]), wide(cells[e - stride])
-    enw, ene = wide(cells[e - stride - 1]), wide(cells[e - stride + 1])
-    near, far = abs(en) + abs(ew), abs(enw) + abs(ene)
-    if k == 0:
-        activity = 2 * near + far + abs(cells[e + stride - 1]) + abs(cells[e - 2 * stride])
-    elif k == 1:
-        activity = 2 * near + far + abs(cells[e - 2]) + abs(cells[e - stride + 2])
-    elif k == 3:
-        activity = 2 * near + 2 * abs(enw) + abs(ene)
-    else:
-        activity = 2 * near + far + abs(cells[e - 2]) + abs(cells[e - 2 * stride])
+    ew, en, enw = wide(cells[e - 1]), wide(cells[e - stride]), wide(cells[e - stride - 1])
     e1, e2 = wide(0), wide(0)
-    if refs == 0:
-        slope = (
-            abs(east - mean) + abs(south - mean)
-            + abs(parents[block - 1] - mean) + abs(parents[up] - mean)
-        )  # fmt: skip
-        s1, s2 = _level(activity), _level(2 * slope) >> 1
-    else:
-        t1 = t + place.first + place.errors
-        e1 = wide(cells[t1])
-        here = 2 * abs(e1)
-        if refs > 1:
-            e2 = wide(cells[t + place.second + place.errors])
-            here = abs(e1) + abs(e2)
-        around = (
-            abs(cells[t1 - 1]) + abs(cells[t1 - stride])
-            + abs(cells[t1 + stride]) + abs(cells[t1 + 1])
-        )  # fmt: skip
-        s1, s2 = _level((activity + around) >> 1), _level(2 * here) >> 1
+    if refs > 0:
+        e1 = wide(cells[t + place.first + place.errors])
+    if refs > 1:
+        e2 = wide(cells[t + place.second + place.errors])
+    activity = _activity(cells, e, k, stride)
+    s1, s2 = _magnitude_levels(activity, t, block, refs, e1, e2, place, cells, parents)
 
     row = (k * MAGNITUDES + s1) * SECOND + s2
     scale = wide(state.scale[row, 0])
-    tilt = ((k * 9 + _five(ew)) * 9 + _five(en)) * 9 + (_five(e1) if refs > 0 else _five(enw))
+    tilt = ((k * 9 + _grade(ew)) * 9 + _grade(en)) * 9 + (_grade(e1) if refs > 0 else _grade(enw))
     mu = (predict(state.pending, state.weights, k, waiting) + state.bias[tilt]) >> (WEIGHT_BITS - 8)
     mu = min(max(mu + base * 256, -32768), 98304)
     rounded = (mu + 128) >> 8
@@ -279,40 +368,16 @@ def _texel(
         notes[1] = _hash(20 + k, tilt, fraction, s1 >> 2)
     if refs > 0:
         notes[2] = _hash(60 + final, guess, v1, v2)
-        other = _five(e2) if refs > 1 else _five(ew)
-        notes[3] = _hash(40 + k, _five(e1) * 9 + other, s1 >> 2, fraction)
+        grades = _grade(e1) * 9 + (_grade(e2) if refs > 1 else _grade(ew))
+        notes[3] = _hash(40 + k, grades, s1 >> 2, fraction)
     else:
         notes[2] = _hash(80 + final, guess, w, size >> 3)
-        bend = (_five(w - nw) * 9 + _five(n - nw)) * 9 + _five(ne - n if k == 1 else east - mean)
-        notes[3] = _hash(40 + k, bend, size >> 1, fraction)
-    # Where the neighbours' values, shifted as the reference shifts, lie from the prediction.
-    left, over = w - guess, n - guess
-    if refs > 0:
-        left, over = left + v1 - v1w, over + v1 - cells[t + place.first - stride]
-    left, over = min(max(left, -20), 20), min(max(over, -20), 20)
-    notes[4] = _hash(90 + k, left * 41 + over, size >> 2, 0)
-
-    far_w, far_n = nw - guess, ne - guess
-    if refs > 1:
-        far_w = w + v2 - cells[t + place.second - 1] - guess
-        far_n = n + v2 - cells[t + place.second - stride] - guess
-    elif refs > 0:
-        far_w += v1 - cells[t + place.first - stride - 1]
-        far_n += v1 - cells[t + place.first - stride + 1]
-    far_w, far_n = min(max(far_w, -20), 20), min(max(far_n, -20), 20)
-    notes[5] = _hash(110 + k, far_w * 41 + far_n, left * 41 + over, 0)
-
+        bend = ne - n if k == 1 else wide(parents[block + 1]) - mean
+        grades = (_grade(w - nw) * 9 + _grade(n - nw)) * 9 + _grade(bend)
+        notes[3] = _hash(40 + k, grades, size >> 1, fraction)
+    _note_offsets(notes, k, t, refs, guess, size, v1, v2, place, cells)
     look_up(notes, slots, mask)
-    matched = 0
-    for i in range(MATCHES):
-        entry = wide(values[notes[WHERE + i]])
-        v, times = entry & 255, entry >> 8
-        notes[SURE + i] = times
-        if times == 0 or v < lo or v > hi:
-            v = wide(-1)
-        elif i < 2:
-            matched += (1 if i == 0 else 3) * (2 if times > 3 else 1)
-        notes[FOUND + i] = v
+    matched = _propose(notes, values, lo, hi)
 
     deep = DEEP if refs > 0 else len(BUCKETS)
     v = code_residual(
@@ -329,19 +394,12 @@ def _texel(
     state.scale[row, 1] = min(count + 1, SCALE_COUNT)
     if k != 3:
         state.bias[tilt] += ((v * 256 - mu) * 655) >> 8
-    for i in range(MATCHES):
-        at = notes[WHERE + i]
-        entry = wide(values[at])
-        times = entry >> 8
-        if entry & 255 == v and times > 0:
-            values[at] = v | min(times + 1, CONFIRMED - 1) << 8
-        else:
-            values[at] = v | (1 if times < 2 else times >> 2) << 8
+    _confirm(notes, values, v)
     state.pending[k, waiting, TARGET] = v - base
     state.pending[k, waiting, FEATURES] = IMPORTANCE[min(scale >> 13, 2047)]
     learn(
-        state.normal, state.pending, state.weights, state.seen, k, features, tables_.left,
-        tables_.right,
+        state.normal, state.pending, state.weights, state.seen, k, features, tables_.weighted,
+        tables_.samples,
     )  # fmt: skip
 
 

@@ -26,14 +26,14 @@ MAGNITUDE_TOP = 1023
 _TAIL = np.exp(np.arange(LOGIT_TOP, -LOGIT_TOP - 1, -1) / 256)
 
 
-def _rounded(values: NDArray[np.float64]) -> Table:
+def _round(values: NDArray[np.float64]) -> Table:
     return np.rint(values).astype(np.int32)
 
 
 @cache
 def squash() -> Table:
     """1 / (1 + e^-x) with 16 fractional bits, for x = -3072 … 3072 in units of 1/256."""
-    return _rounded(65536 / (1 + _TAIL))
+    return _round(65536 / (1 + _TAIL))
 
 
 def stretch(squashed: Table) -> Table:
@@ -45,7 +45,7 @@ def stretch(squashed: Table) -> Table:
 
 def soft_plus() -> Table:
     """ln(1 + e^x), 12 fractional bits, x as in `squash`: minus the logarithm of a logistic tail."""
-    return _rounded(4096 * np.log1p(_TAIL[::-1]))
+    return _round(4096 * np.log1p(_TAIL[::-1]))
 
 
 def survival() -> Table:
@@ -53,13 +53,13 @@ def survival() -> Table:
 
     L is read at the middle of its step, (i + ½) / 256.
     """
-    return _rounded(-256 * np.log(np.expm1((np.arange(LOGIT_TOP + 1) + 0.5) / 256)))
+    return _round(-256 * np.log(np.expm1((np.arange(LOGIT_TOP + 1) + 0.5) / 256)))
 
 
 @cache
 def magnitude() -> Table:
     """Level 0 … 23 of a magnitude 0 … 1023: 2.4 log2(1 + ¾ a), rounded, at most 23."""
-    levels = _rounded(2.4 * np.log2(1 + 0.75 * np.arange(MAGNITUDE_TOP + 1)))
+    levels = _round(2.4 * np.log2(1 + 0.75 * np.arange(MAGNITUDE_TOP + 1)))
     return np.minimum(levels, np.int32(MAGNITUDES - 1))
 
 

@@ -28,8 +28,8 @@ from ptmtools.texture.coders.group import (
     TABLE_BITS,
     TABLE_SIZE,
     TRUNCATED,
-    Reader,
-    damaged,
+    GroupReader,
+    group_error,
 )
 
 
@@ -150,13 +150,13 @@ def choose(counts: NDArray[np.int64], plain: int, family: Family) -> tuple[Frequ
     named = (kinds != UNUSED) & (kinds != SENT)
     frequency[named] = family.tables[kinds[named]]
     # Numbers take four nibbles at most.
-    most = 2 * (2 * len(kinds) + 257 * int(np.count_nonzero(kinds == SENT)))
-    packed = np.zeros(most, np.uint8)
+    room = 2 * (2 * len(kinds) + 257 * int(np.count_nonzero(kinds == SENT)))
+    packed = np.zeros(room, np.uint8)
     size = kernels.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
     return frequency, size.to_bytes(2, "little") + packed[:size].tobytes()
 
 
-def parse(reader: Reader, tables: int, family: Family, version_1: bool = False) -> Frequencies:
+def parse(reader: GroupReader, tables: int, family: Family, version_1: bool = False) -> Frequencies:
     """The inverse of `choose`: frequencies (tables, 256).
 
     Files of version 1 have a byte for each table first, which names its kind.
@@ -172,7 +172,7 @@ def parse(reader: Reader, tables: int, family: Family, version_1: bool = False) 
         packed, version_1, kinds, _FIRST_KIND, SENT, family.tables, frequency, np.zeros(2, np.int64)
     )
     if error:
-        raise damaged(_ERRORS[error])
+        raise group_error(_ERRORS[error])
     return frequency
 
 
@@ -234,7 +234,7 @@ def encode_symbols(sink: Sink, plain: int, family: Family) -> tuple[bytes, bytes
     return packed, count + b"".join(part.astype("<u2").tobytes() for part in parts)
 
 
-def read_stream(reader: Reader, longest_row: int) -> Stream:
+def read_stream(reader: GroupReader, longest_row: int) -> Stream:
     """The stream in the remaining bytes, to be decoded in rows of at most ``longest_row`` symbols.
 
     Raises InputError PTM-I112 if the bytes are none.
@@ -243,7 +243,7 @@ def read_stream(reader: Reader, longest_row: int) -> Stream:
     data = reader.rest()
     limit = len(data) // 2
     if limit < 8 or len(data) % 2:
-        raise damaged("its stream is not a whole number of words")
+        raise group_error("its stream is not a whole number of words")
     words = np.zeros(limit + longest_row + kernels.PADDING, np.uint16)
     words[:limit] = np.frombuffer(data, "<u2")
     return Stream(words, limit, escapes)
@@ -253,4 +253,4 @@ def check_end(result: int) -> None:
     """Raise InputError PTM-I112 for what a decoding pass returns, but for OK."""
     if result != OK:
         early = result == TRUNCATED
-        raise damaged("its stream " + ("ends early" if early else "leads to impossible texels"))
+        raise group_error("its stream " + ("ends early" if early else "leads to impossible texels"))

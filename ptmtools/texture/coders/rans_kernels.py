@@ -51,13 +51,13 @@ def decode_row(
     starts: uint64, where in ``table`` the table of each context begins. contexts: of each symbol.
     """
     sixteen, twelve, part = np.uint64(16), np.uint64(12), np.uint64(4095)
-    zero, one, two, three = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
+    zero, unit, two, three = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
     x0, x1, x2, x3 = state[0], state[1], state[2], state[3]
     i, k = zero, np.uint64(at)
     whole = np.uint64(n & ~3)
     while i < whole:
         e0 = np.uint64(table[starts[np.uint64(contexts[i])] + (x0 & _MASK)])
-        e1 = np.uint64(table[starts[np.uint64(contexts[i + one])] + (x1 & _MASK)])
+        e1 = np.uint64(table[starts[np.uint64(contexts[i + unit])] + (x1 & _MASK)])
         e2 = np.uint64(table[starts[np.uint64(contexts[i + two])] + (x2 & _MASK)])
         e3 = np.uint64(table[starts[np.uint64(contexts[i + three])] + (x3 & _MASK)])
         x0 = ((e0 >> twelve) & part) * (x0 >> _BITS) + (e0 & part)
@@ -65,25 +65,25 @@ def decode_row(
         x2 = ((e2 >> twelve) & part) * (x2 >> _BITS) + (e2 & part)
         x3 = ((e3 >> twelve) & part) * (x3 >> _BITS) + (e3 & part)
         out[i] = e0 >> np.uint64(24)
-        out[i + one] = e1 >> np.uint64(24)
+        out[i + unit] = e1 >> np.uint64(24)
         out[i + two] = e2 >> np.uint64(24)
         out[i + three] = e3 >> np.uint64(24)
         refill = x0 < _LOW
         word = np.uint64(words[k])
         x0 = (x0 << sixteen) | word if refill else x0
-        k += one if refill else zero
+        k += unit if refill else zero
         refill = x1 < _LOW
         word = np.uint64(words[k])
         x1 = (x1 << sixteen) | word if refill else x1
-        k += one if refill else zero
+        k += unit if refill else zero
         refill = x2 < _LOW
         word = np.uint64(words[k])
         x2 = (x2 << sixteen) | word if refill else x2
-        k += one if refill else zero
+        k += unit if refill else zero
         refill = x3 < _LOW
         word = np.uint64(words[k])
         x3 = (x3 << sixteen) | word if refill else x3
-        k += one if refill else zero
+        k += unit if refill else zero
         i += np.uint64(4)
     state[0], state[1], state[2], state[3] = x0, x1, x2, x3
     while i < np.uint64(n):
@@ -94,9 +94,9 @@ def decode_row(
         out[i] = e >> np.uint64(24)
         if x < _LOW:
             x = (x << sixteen) | np.uint64(words[k])
-            k += one
+            k += unit
         state[lane] = x
-        i += one
+        i += unit
     # Signed: with a plain integer an unsigned one would become a float.
     return np.int64(k)
 
@@ -146,11 +146,11 @@ def decode_single(table: Any, context: Any, state: Any, lane: Any, word: Any) ->
     """
     x = state[lane]
     slot = x & _MASK
-    own = np.uint64(context) * np.uint64(SINGLE_SIZE)
+    begin = np.uint64(context) * np.uint64(SINGLE_SIZE)
     # Four symbols to a number.
-    four = np.uint64(table[own + (slot >> np.uint64(2))])
+    four = np.uint64(table[begin + (slot >> np.uint64(2))])
     z = (four >> ((slot & np.uint64(3)) << np.uint64(3))) & np.uint64(255)
-    interval = np.uint64(table[own + np.uint64(TABLE_SIZE // 4) + z])
+    interval = np.uint64(table[begin + np.uint64(TABLE_SIZE // 4) + z])
     x = (interval >> np.uint64(12)) * (x >> _BITS) + slot - (interval & np.uint64(4095))
     # Without a branch, which would be guessed wrong half of the time.
     refill = x < _LOW
@@ -192,13 +192,13 @@ def encode(
         state[last] = _LOW
     at, escaped = np.uint64(words.size - 1), np.uint64(escapes.size)
     i = np.uint64(symbols.size)
-    one, four = np.uint64(1), np.uint64(4)
+    unit, four = np.uint64(1), np.uint64(4)
     while i > np.uint64(0):
-        i -= one
+        i -= unit
         context, z = np.uint64(contexts[i]), np.uint64(symbols[i])
         symbol = work[context, min(z, np.uint64(ESCAPE))]
         if context < np.uint64(plain) and (z >= np.uint64(ESCAPE) or symbol == 0):
-            escaped -= one
+            escaped -= unit
             escapes[escaped] = z
             symbol = work[context, np.uint64(ESCAPE)]
         lane = i & np.uint64(3)
@@ -207,7 +207,7 @@ def encode(
         # Without a branch, which would be guessed wrong often: the word is written in any case.
         full = x >= share << np.uint64(20)
         words[at] = x & np.uint64(0xFFFF)
-        at -= one if full else np.uint64(0)
+        at -= unit if full else np.uint64(0)
         x = x >> np.uint64(16) if full else x
         q = (x * (symbol >> np.uint64(27))) >> ((symbol & np.uint64(15)) + np.uint64(31))
         state[lane] = (q << _BITS) + (x - q * share) + ((symbol >> four) & _MASK)
@@ -235,25 +235,25 @@ def normalise(counts: Any, frequency: Any, used: Any) -> None:
                 total += counts[t, s]
                 used[many] = s
                 many += 1
-        left = TABLE_SIZE if many > 0 else 0
+        missing = TABLE_SIZE if many > 0 else 0
         for i in range(many):
             s = used[i]
             f = max(1, (counts[t, s] * TABLE_SIZE + total // 2) // total)
             frequency[t, s] = f
-            left -= f
-        step = 1 if left > 0 else -1
-        while left != 0:
-            best, n, f = -1, 0, 0
+            missing -= f
+        step = 1 if missing > 0 else -1
+        while missing != 0:
+            best, best_count, best_f = -1, 0, 0
             for i in range(many):
                 s = used[i]
-                mine, own = counts[t, s], frequency[t, s]
-                if own + step == 0:
+                n, f = counts[t, s], frequency[t, s]
+                if f + step == 0:
                     continue
-                one, other = n * (2 * own + step), mine * (2 * f + step)
-                if best < 0 or ((one < other) if step > 0 else (one > other)):
-                    best, n, f = s, mine, own
+                gain, best_gain = n * (2 * best_f + step), best_count * (2 * f + step)
+                if best < 0 or ((gain > best_gain) if step > 0 else (gain < best_gain)):
+                    best, best_count, best_f = s, n, f
             frequency[t, best] += step
-            left -= step
+            missing -= step
 
 
 @kernel

@@ -14,7 +14,7 @@ from ptmtools.texture.coders import (
     repeats_blocks as blocks,
     repeats_kernels as kernels,
 )
-from ptmtools.texture.coders.group import Reader, plane_order
+from ptmtools.texture.coders.group import GroupReader, plane_order
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
 from ptmtools.texture.coders.rans_kernels import split_numbers
 
@@ -37,7 +37,7 @@ def find(level: Bytes, below: Bytes) -> Sink:
     edge = level.shape[0] * level.shape[1] - 4 * count
     numbers = np.empty(kernels.MOST_SYMBOLS * count + 5 * edge, np.uint32)
     state = np.zeros(9, np.int64)
-    _pass(_packed(level), _packed(below), level.shape, numbers, None, state)
+    _pass(_pack(level), _pack(below), level.shape, numbers, None, state)
     sink = empty_sink(int(state[blocks.COUNT]), blocks.TABLES)
     split_numbers(numbers[: state[blocks.COUNT]], *sink)
     return sink
@@ -56,7 +56,7 @@ def write(sink: Sink) -> bytes:
 
 def decode(data: Data, below: Bytes, shape: Shape) -> Bytes:
     """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     frequency = tables.parse(reader, blocks.TABLES, tables.built_in())
     stream = read_stream(reader, kernels.MOST_SYMBOLS)
     escaped = len(stream.escapes)
@@ -64,8 +64,8 @@ def decode(data: Data, below: Bytes, shape: Shape) -> Bytes:
     state[blocks.ESCAPES_END] = escaped
     level = np.empty(shape[:2], np.uint32)
     words = np.concatenate([stream.escapes, stream.words])
-    source = blocks.Source(tables.single_tables(frequency), words, escaped + stream.limit)
-    check_end(_pass(level, _packed(below), shape, None, source, state))
+    source = blocks.RepeatsSource(tables.single_tables(frequency), words, escaped + stream.limit)
+    check_end(_pass(level, _pack(below), shape, None, source, state))
     if shape[2] != 3:
         return level.astype(f"<u{shape[2]}").view(np.uint8).reshape(shape)
     texels = np.empty(shape, np.uint8)
@@ -78,7 +78,7 @@ def _pass(
     below: NDArray[np.uint32],
     shape: tuple[int, ...],
     sink: NDArray[np.uint32] | None,
-    source: blocks.Source | None,
+    source: blocks.RepeatsSource | None,
     state: NDArray[np.int64],
 ) -> int:
     """Calls `repeats_kernels.repeats_pass` with the tables that it fills."""
@@ -103,7 +103,7 @@ def _pass(
     )
 
 
-def _packed(level: Bytes) -> NDArray[np.uint32]:
+def _pack(level: Bytes) -> NDArray[np.uint32]:
     """Texels (h, w, c) as one number each."""
     level = np.ascontiguousarray(level)
     if level.shape[2] != 3:

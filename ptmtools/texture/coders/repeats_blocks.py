@@ -29,7 +29,7 @@ TABLES = RUN + 8
 COUNT, WORD, NEXT_ESCAPE, ESCAPES_END, STRAY = 4, 5, 6, 7, 8
 
 
-class Source(NamedTuple):
+class RepeatsSource(NamedTuple):
     """A decoder's source of symbols."""
 
     table: Any  # uint32 of `rans.single_tables`
@@ -91,16 +91,16 @@ def _plus(a: Any, b: Any) -> Any:
 
 
 @kernel
-def shifted(block: Any, change: Any) -> Any:
+def shift_block(block: Any, change: Any) -> Any:
     """A block with ``change`` added to each byte of its texels."""
     p, q, r, s = block
     return _plus(p, change), _plus(q, change), _plus(r, change), _plus(s, change)
 
 
 @kernel
-def same(one: Any, other: Any) -> Any:
-    p, q, r, s = one
-    a, b, c, d = other
+def same(block: Any, guess: Any) -> Any:
+    p, q, r, s = block
+    a, b, c, d = guess
     return (p == a) & (q == b) & (r == c) & (s == d)
 
 
@@ -134,7 +134,7 @@ def texel_slot(
 
 
 @kernel
-def known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> Any:
+def guess_rank(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> Any:
     """Number of the first guess that is the texel; 5 for none."""
     rank = 4 if texel == ne else 5
     if texel == nw:
@@ -152,7 +152,7 @@ def seen_texel(
     state: Any,
 ) -> Any:  # fmt: skip
     """A texel that is one of five guesses, or `OTHER`."""
-    rank = known(texel, seen, w, n, nw, ne)
+    rank = guess_rank(texel, seen, w, n, nw, ne)
     if w == n:
         context += 1
     if (seen == w) | (seen == n):
@@ -186,15 +186,15 @@ def choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: Any
     texels = (seen, r, q, p, west)
     possible, place, chosen = 0, -1, seen
     for i in range(5):
-        one = texels[i]
-        fresh = _fits(mean, p, q, r, one)
+        candidate = texels[i]
+        fresh = _fits(mean, p, q, r, candidate)
         for j in range(i):
-            fresh &= texels[j] != one
+            fresh &= texels[j] != candidate
         if fresh:
-            if one == wanted:
+            if candidate == wanted:
                 place = possible
             if possible == nth:
-                chosen = one
+                chosen = candidate
             possible += 1
     return possible, place, chosen
 
@@ -203,12 +203,12 @@ def choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: Any
 def spread(block: Any, components: Any) -> Any:
     """The largest difference between texels of a block, over the components."""
     p, q, r, s = block
-    most: Any = 0
+    widest: Any = 0
     for _ in range(components):
         a, b, c, d = p & _BYTE, q & _BYTE, r & _BYTE, s & _BYTE
-        most = max(most, np.int64(max(max(a, b), max(c, d)) - min(min(a, b), min(c, d))))
+        widest = max(widest, np.int64(max(max(a, b), max(c, d)) - min(min(a, b), min(c, d))))
         p, q, r, s = p >> _EIGHT, q >> _EIGHT, r >> _EIGHT, s >> _EIGHT
-    return most
+    return widest
 
 
 LARGEST_ACTIVITY = 1023

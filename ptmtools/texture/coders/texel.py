@@ -24,7 +24,13 @@ from ptmtools.texture.coders import (
     texel_kernels as kernels,
     texel_layout as layout,
 )
-from ptmtools.texture.coders.group import OK, Reader, damaged, plane_order, references
+from ptmtools.texture.coders.group import (
+    OK,
+    GroupReader,
+    group_error,
+    plane_order,
+    reference_counts,
+)
 from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
 from ptmtools.texture.coders.texel_layout import (
     Numbering,
@@ -63,7 +69,7 @@ def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, S
     """
     candidates: list[Coded] = [(PLAIN, sample_bytes(level), level)]
     if below.size:
-        candidates += _codings(level, below, max_error)
+        candidates += _coded_forms(level, below, max_error)
     # The raw form takes no less than three quarters of the plain one.
     if not max_error and 4 * min(len(body) for _, body, _ in candidates) > 3 * level.nbytes:
         candidates.append((RAW, raw.encode_tile(level, below).data, level))
@@ -73,7 +79,7 @@ def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, S
 
 def decode(data: Data, below: Samples, shape: Shape, max_error: int = 0) -> Samples:
     """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     form = reader.number(1)
     if form == PLAIN:
         level = reader.texels(shape, below.dtype)
@@ -83,7 +89,7 @@ def decode(data: Data, below: Samples, shape: Shape, max_error: int = 0) -> Samp
         return raw.decode_tile(reader.rest(), below, shape).texels
     if form in (CODED, CODED_WITH_WEIGHTS) and below.size:
         return _decode(reader, below, shape, max_error, form == CODED_WITH_WEIGHTS)
-    raise damaged(f"form {form} is unknown")
+    raise group_error(f"form {form} is unknown")
 
 
 @dataclass(frozen=True)
@@ -113,12 +119,12 @@ class _Group:
         plain: Numbers,
         limits: NDArray[np.int64],
         sink: Sink | None = None,
-        source: kernels.Source | None = None,
+        source: kernels.TexelSource | None = None,
     ) -> int:
         """Calls `texel_kernels.texel_pass`, with empty arrays for the direction that it does not
         take."""
         components = numbers.shape[2]
-        others = references(components)
+        others = reference_counts(components)
         exact = {"float16": kernels.HALF, "float32": kernels.SINGLE}.get(
             self.kind.name, kernels.WHOLE
         )
@@ -139,7 +145,7 @@ class _Group:
                 self.numbering.arrays,
                 window,
                 sink or empty_sink(0, 0),
-                source or kernels.Source(none, none, np.zeros(0, np.uint32)),
+                source or kernels.TexelSource(none, none, np.zeros(0, np.uint32)),
                 plain,
                 limits,
                 kernels.workspace(numbers.shape[1], components),
@@ -147,13 +153,13 @@ class _Group:
         )
 
 
-def _codings(level: Samples, below: Samples, max_error: int) -> list[Coded]:
+def _coded_forms(level: Samples, below: Samples, max_error: int) -> list[Coded]:
     """The coded group, in one or two ways; none if the level below is not its mean."""
     kind = kind_of(level.dtype)
-    values, means = (to_ordered(one).astype(np.uint32) for one in (level, below))
+    values, means = (to_ordered(candidate).astype(np.uint32) for candidate in (level, below))
     numbering = number_planes(values, kind.top, max_error)
     numbers = numbering.nearest(values)
-    work = _enlarged(numbering.nearest(means), level.shape)
+    work = _enlarge(numbering.nearest(means), level.shape)
     group = _Group(kind, means, numbering, work, max_error)
     blocks = below.shape[:2]
     codings: list[Coded | None] = []
@@ -161,14 +167,14 @@ def _codings(level: Samples, below: Samples, max_error: int) -> list[Coded]:
     many = blocks[0] * blocks[1] >= FEWEST_BLOCKS and min(blocks) >= 4
     if many and numbering.arrays.tops.any():
         weights = fit_weights(work, numbers, max_error)
-        codings.append(_coding(group, level, numbers, weights))
+        codings.append(_encode_coded(group, level, numbers, weights))
     light = LIGHT * 2 * int(layout.sent_mask(level.shape[2]).sum())
     if not codings or (codings[0] and len(codings[0][1]) < light):
-        codings.append(_coding(group, level, numbers, None))
-    return [one for one in codings if one]
+        codings.append(_encode_coded(group, level, numbers, None))
+    return [candidate for candidate in codings if candidate]
 
 
-def _coding(
+def _encode_coded(
     group: _Group, level: Samples, numbers: Numbers, weights: Weights | None
 ) -> Coded | None:
     sink = empty_sink(level.size * group.numbering.symbols, kernels.TABLES)
@@ -184,7 +190,7 @@ def _coding(
     packed, stream = encode_symbols(sink, kernels.TABLES, layout.table_family())
     body = b"".join(
         [
-            group.numbering.packed(),
+            group.numbering.pack(),
             bytes([window]),
             b"" if weights is None
             else weights[layout.sent_mask(level.shape[2])].astype("<i2").tobytes(),
@@ -209,15 +215,17 @@ def _window(group: _Group, numbers: Numbers) -> int:
     return min(max(usual.bit_length() - WINDOW_USUAL, 0), WINDOW_TOP)
 
 
-def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: bool) -> Samples:
+def _decode(
+    reader: GroupReader, below: Samples, shape: Shape, max_error: int, sent: bool
+) -> Samples:
     kind = kind_of(below.dtype)
     means = to_ordered(below).astype(np.uint32)
     numbering = read_numbering(reader, shape[2], kind.top)
     if max_error and not numbering.plain:
-        raise damaged("values are numbered although an error is allowed")
+        raise group_error("values are numbered although an error is allowed")
     window = reader.number(1)
     if window > WINDOW_TOP:
-        raise damaged("its window is impossible")
+        raise group_error("its window is impossible")
     weights = _read_weights(reader, shape[2]) if sent else None
     frequency = tables.parse(reader, kernels.TABLES, layout.table_family())
     bits = reader.numbers("u1", reader.number(4))
@@ -227,9 +235,9 @@ def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: 
     plain.view(np.uint8)[: len(bits)] = bits
     stream = read_stream(reader, row)
     numbers = np.zeros(shape, np.uint32)
-    work = _enlarged(numbering.nearest(means), shape)
+    work = _enlarge(numbering.nearest(means), shape)
     limits = np.array([stream.limit, 8 * len(bits)], np.int64)
-    source = kernels.Source(stream.words, stream.escapes, tables.single_tables(frequency))
+    source = kernels.TexelSource(stream.words, stream.escapes, tables.single_tables(frequency))
     group = _Group(kind, means, numbering, work, max_error)
     check_end(
         group.code(
@@ -239,16 +247,16 @@ def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: 
     return from_ordered(numbering.values(numbers).astype(f"u{kind.size}"), below.dtype)
 
 
-def _read_weights(reader: Reader, components: int) -> Weights:
+def _read_weights(reader: GroupReader, components: int) -> Weights:
     mask = layout.sent_mask(components)
     weights = np.zeros(mask.shape, np.int64)
     weights[mask] = reader.numbers("<i2", int(mask.sum()))
     if int(np.abs(weights).sum(axis=2).max()) > layout.WEIGHT_SUM:
-        raise damaged("a weight is out of range")
+        raise group_error("a weight is out of range")
     return weights
 
 
-def _enlarged(numbers: Numbers, shape: tuple[int, ...]) -> Numbers:
+def _enlarge(numbers: Numbers, shape: tuple[int, ...]) -> Numbers:
     """The level below at twice its size, planes apart, with a frame."""
     sides = []
     for side, half in zip(shape[:2], numbers.shape[:2], strict=True):

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.jit import kernel
+from ptmtools.jit import inlined_kernel, kernel
 from ptmtools.texture.coders.group import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.rans_kernels import STATE_LOW, decode_single, start_states
 
@@ -46,9 +46,11 @@ NARROW_TOP = 16
 DIRECT = 16
 #: Plain bits of the longest number.
 PLAIN_TOP = 30
+_ZERO, _ONE, _TWO, _THREE = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
+_SIX, _TEN, _ELEVEN, _TWELVE = np.uint64(6), np.uint64(10), np.uint64(11), np.uint64(12)
 
 
-class Source(NamedTuple):
+class TexelSource(NamedTuple):
     """A decoder's source of symbols."""
 
     words: Any  # uint16, and
@@ -56,7 +58,7 @@ class Source(NamedTuple):
     table: Any  # uint32 of `rans.single_tables`
 
 
-class Workspace(NamedTuple):
+class TexelWorkspace(NamedTuple):
     """Scratch arrays of a pass, allocated outside, which compiles faster."""
 
     errors: Any
@@ -66,9 +68,9 @@ class Workspace(NamedTuple):
     state: Any
 
 
-def workspace(width: int, components: int) -> Workspace:
+def workspace(width: int, components: int) -> TexelWorkspace:
     """Allocates the workspace of groups ``width`` texels wide."""
-    return Workspace(
+    return TexelWorkspace(
         errors=np.zeros(components * 4 * (width + BEFORE + BEHIND), np.int64),
         # One additional plane, which stays 0, stands for an absent reference.
         residual=np.zeros((components + 1) * 4, np.int64),
@@ -85,12 +87,12 @@ def _bit_length(n: Any) -> Any:
 
 
 @kernel
-def real(ordered: Any, kind: int) -> Any:
+def float_value(number: Any, kind: int) -> Any:
     """The float that an ordered integer stands for, as float64."""
     if kind == SINGLE:
-        single = np.uint32(ordered ^ 0x80000000 if ordered & 0x80000000 else ~ordered)
+        single = np.uint32(number ^ 0x80000000 if number & 0x80000000 else ~number)
         return np.float64(single.view(np.float32))
-    bits = np.int64(ordered ^ 0x8000 if ordered & 0x8000 else ~ordered & 0xFFFF)
+    bits = np.int64(number ^ 0x8000 if number & 0x8000 else ~number & 0xFFFF)
     exponent, mantissa = (bits >> 10) & 31, bits & 1023
     if exponent == 31:
         value = np.inf if mantissa == 0 else np.nan
@@ -102,7 +104,7 @@ def real(ordered: Any, kind: int) -> Any:
 
 
 @kernel
-def ordered(value: Any, kind: int) -> Any:
+def ordered_value(value: Any, kind: int) -> Any:
     """The ordered integer of a float64, no NaN, rounded to the kind, half to even."""
     if kind == SINGLE:
         bits = np.int64(np.float32(value).view(np.uint32))
@@ -166,13 +168,14 @@ def _last_range(
         low = 4 * mean - p - q - r
         high = low + 3
     else:
-        a, b, c, m = real(p, kind), real(q, kind), real(r, kind), real(mean, kind)
+        a, b, c = float_value(p, kind), float_value(q, kind), float_value(r, kind)
+        m = float_value(mean, kind)
         value = 4.0 * m - ((a + b) + c)
         if abs(value) < np.inf:
             # The mean is off by half a unit of its last place, the sum by a few of float64's.
             unit = _unit(m, kind)
             margin = 2.0 * unit + (4.0 * abs(m) + ((abs(a) + abs(b)) + abs(c))) * 2.0**-50
-            low, high = ordered(value - margin, kind), ordered(value + margin, kind)
+            low, high = ordered_value(value - margin, kind), ordered_value(value + margin, kind)
     out[0] = _numbers_below(low, plane, numbering, top)
     out[1] = _numbers_below(high + 1, plane, numbering, top) - 1
 
@@ -191,8 +194,8 @@ def _fold(number: Any, guess: Any, low: Any, high: Any) -> Any:
 def _unfold(z: Any, guess: Any, low: Any, high: Any) -> Any:
     """The inverse of `_fold`; outside low … high for a z that it does not make."""
     near = min(guess - low, high - guess)
-    far = z - near if guess - low == near else near - z
-    return guess + (far if z > 2 * near else (z >> 1) ^ -(z & 1))
+    beyond = z - near if guess - low == near else near - z
+    return guess + (beyond if z > 2 * near else (z >> 1) ^ -(z & 1))
 
 
 @kernel
@@ -200,6 +203,84 @@ def _next_symbol(state: Any, n: Any, words: Any, at: Any, table: Any, context: A
     """The symbol number n of the stream, and the next word's index."""
     z, refill = decode_single(table, context, state, n & np.uint64(3), words[at])
     return z, at + np.uint64(1 if refill else 0)
+
+
+@inlined_kernel
+def _weigh(
+    work: Any, place: Any, around: Any, nearest: Any, base: Any, weights: Any, w: Any,
+) -> Any:  # fmt: skip
+    """Σ weight · (neighbour - base) over the ten neighbours, and Σ |neighbour - base| over the
+    first six; ``nearest`` and ``w``: of the first in ``around`` and ``weights``."""
+    total, slope = np.int64(0), np.int64(0)
+    j = _ZERO
+    while j < _SIX:
+        f = np.int64(work[place + around[nearest + j]]) - base
+        total += weights[w + j] * f
+        slope += abs(f)
+        j += _ONE
+    while j < _TEN:
+        total += weights[w + j] * (np.int64(work[place + around[nearest + j]]) - base)
+        j += _ONE
+    return total, slope
+
+
+@inlined_kernel
+def _activity(
+    errors: Any, row: Any, up: Any, k: Any, slope: Any, count: Any, e1: Any, e2: Any,
+) -> Any:  # fmt: skip
+    """How large an error is to be expected, in sixteenths, from those around and of references."""
+    # Right of s and above it, p of the next block is not known yet.
+    activity = errors[up + _THREE] if k < 3 else errors[row + _ONE]
+    activity += 2 * (errors[row + _ONE] + errors[up + _TWO]) + errors[up + _ONE]
+    if count == 0:
+        activity = 16 * activity + 2 * slope
+    elif count == 1:
+        activity = 8 * activity + slope + 16 * abs(e1)
+    else:
+        activity = 8 * activity + slope + 8 * abs(e1) + 24 * abs(e2)
+    return activity
+
+
+@inlined_kernel
+def _context(activity: Any, narrow: bool, size: Any, window: Any, count: Any, k: Any) -> Any:
+    """The table of a token; ``size``: the highest number, if it is ``narrow``."""
+    if narrow:
+        grade = min((_bit_length(activity >> 4) + 1) >> 1, np.int64(3))
+        return NARROW + 4 * (_bit_length(size) - 1) + grade
+    context = CLASSES * (4 * count + k)
+    if activity > 0:
+        octave = _bit_length(activity) - window
+        context += min(max(octave, np.int64(1)), np.int64(CLASSES - 1))
+    return context
+
+
+@inlined_kernel
+def _put_number(z: Any, plain: Any, bit: Any) -> Any:
+    """The token of a number, whose rest is written at ``bit``; the next bit."""
+    token = z
+    if z >= DIRECT:
+        bits = _bit_length(z) - 3
+        token = DIRECT + 4 * (bits - 2) + ((z >> bits) & 3)
+        rest = z & ((np.int64(1) << bits) - 1)
+        i, skip = bit >> 5, bit & 31
+        plain[i] |= np.uint32((rest << skip) & 0xFFFFFFFF)
+        plain[i + 1] |= np.uint32(rest >> (32 - skip))
+        bit += bits
+    return token, bit
+
+
+@inlined_kernel
+def _take_number(token: Any, plain: Any, bit: Any) -> Any:
+    """The inverse of `_put_number`: the number, and the next bit or -1 for an impossible token."""
+    # Without branches, which would be guessed wrong often.
+    bits = max((token - (DIRECT - 8)) >> 2, np.int64(0)) if token >= DIRECT else 0
+    if bits > PLAIN_TOP:
+        return token, np.int64(-1)
+    word, skip = np.uint64(bit >> 5), np.uint64(bit & 31)
+    both = np.uint64(plain[word]) | np.uint64(plain[word + _ONE]) << np.uint64(32)
+    rest = np.int64(both >> skip) & ((np.int64(1) << bits) - 1)
+    z = (((4 + (token & 3)) << bits) | rest) if token >= DIRECT else token
+    return z, bit + bits
 
 
 @kernel
@@ -222,9 +303,9 @@ def texel_pass(
     near: the error allowed. kind: FREE, WHOLE, HALF, SINGLE.
     planes, references: (c,) int64, in coding order. weights: (c * 4 * 12,) int64, in coding order.
     around: (4 * 10,) uint64, offsets in ``work`` of the neighbours of p, q, r, s, modulo 2^64.
-    numbering: `texel_layout.Arrays`.
+    numbering: `texel_layout.NumberingArrays`.
     window: doublings of activity that are one class at the low end.
-    sink: `rans.Sink`, for n or with grids 2 * n symbols. source: `Source`.
+    sink: `rans.Sink`, for n or with grids 2 * n symbols. source: `TexelSource`.
     plain: uint32 words of plain bits, with padding for a row of blocks.
     limits: (2,) int64, decoding: numbers of words and of plain bits.
     space: from `workspace`.
@@ -242,9 +323,6 @@ def texel_pass(
     size = np.uint64(work.size // nc)
     step = 2 * near + 1
     scale = _bit_length(step) - 1
-    twelve, low_state = np.uint64(12), np.uint64(STATE_LOW)
-    zero, one, two, three = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
-    six, ten, eleven = np.uint64(6), np.uint64(10), np.uint64(11)
     n, escaped, bit = np.uint64(0), np.int64(0), np.int64(0)
     at = np.uint64(8)
     if not encoding:
@@ -260,8 +338,8 @@ def texel_pass(
                 count = references[c]
                 place = pu * size
                 place += np.uint64((2 * y + BEFORE) * stride + 2 * x + BEFORE)
-                own = np.uint64(4 * c)
-                first = zero if count > 0 else np.uint64(4 * nc)
+                base_row = np.uint64(4 * c)
+                first = _ZERO if count > 0 else np.uint64(4 * nc)
                 second = np.uint64(4) if count > 1 else np.uint64(4 * nc)
                 top, grid = numbering.tops[pu], numbering.grids[pu]
                 for k in range(4):
@@ -270,44 +348,24 @@ def texel_pass(
                         continue
                     ku = np.uint64(k)
                     # Until it is known, a texel reads as the one below it.
-                    here = place + np.uint64((k >> 1) * stride + (k & 1))
-                    base = np.int64(work[here])
-                    w, beside = twelve * (own + ku), ten * ku
+                    t = place + np.uint64((k >> 1) * stride + (k & 1))
+                    base = np.int64(work[t])
+                    w = _TWELVE * (base_row + ku)
                     e1, e2 = residual[first + ku], residual[second + ku]
-                    total = weights[w + ten] * e1 + weights[w + eleven] * e2 + HALF_WEIGHT
-                    slope = np.int64(0)
-                    j = zero
-                    while j < six:
-                        f = np.int64(work[place + around[beside + j]]) - base
-                        total += weights[w + j] * f
-                        slope += abs(f)
-                        j += one
-                    while j < ten:
-                        total += weights[w + j] * (
-                            np.int64(work[place + around[beside + j]]) - base
-                        )
-                        j += one
+                    total, slope = _weigh(work, place, around, _TEN * ku, base, weights, w)
+                    total += weights[w + _TEN] * e1 + weights[w + _ELEVEN] * e2 + HALF_WEIGHT
                     guess = min(max(base + (total >> WEIGHT_BITS), np.int64(0)), top)
                     row = np.uint64(4 * plane + (py & 3)) * wide + np.uint64(px)
                     up = np.uint64(4 * plane + ((py - 1) & 3)) * wide + np.uint64(px)
-                    # Right of s and above it, p of the next block is not known yet.
-                    activity = errors[up + three] if k < 3 else errors[row + one]
-                    activity += 2 * (errors[row + one] + errors[up + two]) + errors[up + one]
-                    if count == 0:
-                        activity = 16 * activity + 2 * slope
-                    elif count == 1:
-                        activity = 8 * activity + slope + 16 * abs(e1)
-                    else:
-                        activity = 8 * activity + slope + 8 * abs(e1) + 24 * abs(e2)
-                    activity >>= scale
+                    activity = _activity(errors, row, up, k, slope, count, e1, e2) >> scale
                     low, high, target = np.int64(0), top, guess
                     last = k == 3 and whole and kind != FREE
                     if last:
-                        p, q = work[place], work[place + one]
+                        p, q = work[place], work[place + _ONE]
                         _last_range(
                             _value(p, plane, numbering),
                             _value(q, plane, numbering),
-                            _value(work[here - one], plane, numbering),
+                            _value(work[t - _ONE], plane, numbering),
                             np.int64(means[np.uint64(y), np.uint64(x), pu]), kind, plane,
                             numbering, top, space.range,
                         )  # fmt: skip
@@ -335,7 +393,7 @@ def texel_pass(
                             else:
                                 off, at = _next_symbol(state, n, words, at, table, context)
                                 off &= 1
-                            n += one
+                            n += _ONE
                         space.grid[pu] = off
                         if off:
                             shift = np.int64(0)
@@ -343,14 +401,8 @@ def texel_pass(
                             low, high = (low + rest) >> shift, high >> shift
                             target = min(max((target + (rest >> 1)) >> shift, low), high)
                             activity >>= shift
-                    if last and high - low < NARROW_TOP:
-                        grade = min((_bit_length(activity >> 4) + 1) >> 1, np.int64(3))
-                        context = NARROW + 4 * (_bit_length(high - low) - 1) + grade
-                    else:
-                        context = CLASSES * (4 * count + k)
-                        if activity > 0:
-                            octave = _bit_length(activity) - window
-                            context += min(max(octave, np.int64(1)), np.int64(CLASSES - 1))
+                    narrow = last and high - low < NARROW_TOP
+                    context = _context(activity, narrow, high - low, window, count, k)
                     z = np.int64(0)
                     if high > low and encoding:
                         number = np.int64(level[np.uint64(py), np.uint64(px), pu]) >> shift
@@ -362,38 +414,22 @@ def texel_pass(
                             if number < low or number > high:
                                 return IMPOSSIBLE
                             z = _fold(number, target, low, high)
-                        token = z
-                        if z >= DIRECT:
-                            bits = _bit_length(z) - 3
-                            token = DIRECT + 4 * (bits - 2) + ((z >> bits) & 3)
-                            rest = z & ((np.int64(1) << bits) - 1)
-                            i, skip = bit >> 5, bit & 31
-                            plain[i] |= np.uint32((rest << skip) & 0xFFFFFFFF)
-                            plain[i + 1] |= np.uint32(rest >> (32 - skip))
-                            bit += bits
+                        token, bit = _put_number(z, plain, bit)
                         symbols[n] = token
                         contexts[n] = context
                         counts[context, token] += 1
-                        n += one
+                        n += _ONE
                     elif high > low:
                         z, at = _next_symbol(state, n, words, at, table, context)
-                        n += one
+                        n += _ONE
                         if z == ESCAPE:
                             if escaped == escapes.size:
                                 return TRUNCATED
                             z = np.int64(escapes[escaped])
                             escaped += 1
-                        # Without branches, as above.
-                        bits = max((z - (DIRECT - 8)) >> 2, np.int64(0)) if z >= DIRECT else 0
-                        if bits > PLAIN_TOP:
+                        z, bit = _take_number(z, plain, bit)
+                        if bit < 0:
                             return IMPOSSIBLE
-                        word, over = np.uint64(bit >> 5), np.uint64(bit & 31)
-                        both = np.uint64(plain[word]) | np.uint64(plain[word + one]) << np.uint64(
-                            32
-                        )
-                        rest = np.int64(both >> over) & ((np.int64(1) << bits) - 1)
-                        z = (((4 + (z & 3)) << bits) | rest) if z >= DIRECT else z
-                        bit += bits
                     if near > 0:
                         e = (z >> 1) ^ -(z & 1)
                         number = min(max(target + e * step, np.int64(0)), top)
@@ -404,14 +440,14 @@ def texel_pass(
                         number <<= shift
                     if near > 0 or not encoding:
                         level[np.uint64(py), np.uint64(px), pu] = number
-                    work[here] = number
-                    residual[own + ku] = number - guess
-                    errors[row + two] = abs(number - guess)
+                    work[t] = number
+                    residual[base_row + ku] = number - guess
+                    errors[row + _TWO] = abs(number - guess)
     if encoding:
         limits[0], limits[1] = np.int64(n), bit
         return OK
     stray = np.int64(at) != limits[0] or (bit + 7) >> 3 != limits[1] >> 3
     stray |= escaped != escapes.size
     for lane in range(4):
-        stray |= state[np.uint64(lane)] != low_state
+        stray |= state[np.uint64(lane)] != np.uint64(STATE_LOW)
     return IMPOSSIBLE if stray else OK

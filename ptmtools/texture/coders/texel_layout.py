@@ -3,10 +3,11 @@ that predict a texel, the built-in weights and the built-in tables. They are par
 
 An encoder may fit the predictors' weights to one group, the same on every machine: least squares
 over a sample of block rows, one system of ten to twelve unknowns for each plane and each of p, q,
-r, s, solved exactly (`group.fitted`). Each sample is divided by the spread of its neighbours first:
-the cost is bits, the logarithm of an error. The candidates include the weights that continue drawn
-and computed images exactly (the texel above, the one to the left, the plane through both): a depth
-map of 512² texels takes 44 kB with them, 98 kB without. On photographs they never win.
+r, s, solved exactly (`group.solve_normal_equations`). Each sample is divided by the spread of its
+neighbours first: the cost is bits, the logarithm of an error. The candidates include the weights
+that continue drawn and computed images exactly (the texel above, the one to the left, the plane
+through both): a depth map of 512² texels takes 44 kB with them, 98 kB without. On photographs they
+never win.
 
 Where only some values occur in a plane, numbers replace them (``docs/formats/ptm-kinds.md``,
 "Numbering"): a lattice (8 bits widened to 16, halves widened to singles), a list of few values
@@ -26,12 +27,12 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coders import rans as tables
 from ptmtools.texture.coders.group import (
-    Reader,
-    damaged,
-    fitted,
+    GroupReader,
+    group_error,
     pack_varints,
     plane_order,
-    references,
+    reference_counts,
+    solve_normal_equations,
 )
 
 #: Rows and columns, from p, of the ten neighbours of p, q, r and s; the first three are those to
@@ -93,7 +94,7 @@ def token_span(token: int) -> tuple[int, int]:
 def sent_mask(components: int) -> NDArray[np.bool_]:
     """Which weights (c, 4, 12) are sent, in this order."""
     mask = np.zeros((components, 4, 12), np.bool_)
-    for c, others in enumerate(references(components)):
+    for c, others in enumerate(reference_counts(components)):
         mask[c, :, : 10 + others] = True
     return mask
 
@@ -152,23 +153,23 @@ def fit_weights(work: NDArray[np.uint32], level: NDArray[np.uint32], max_error: 
     weights = np.zeros((nc, 4, 12), np.int64)
     errors = np.zeros((nc, 4, len(y), bw), np.int64)
     rough = max_error if max_error >= ROUGH_ERROR else 0
-    for c, (plane, others) in enumerate(zip(plane_order(nc), references(nc), strict=True)):
-        sample = _Sample(work[plane], level[:, :, plane], y, rough)
+    for c, (plane, others) in enumerate(zip(plane_order(nc), reference_counts(nc), strict=True)):
+        sample = _RowSample(work[plane], level[:, :, plane], y, rough)
         for k in range(4):
-            neighbours, target = sample.of(k)
+            neighbours, target = sample.features(k)
             f = np.stack([*neighbours, *errors[:others, k]])
             candidates = [_solve(f, target, LEAST_SPREAD + max_error), *_continuations(len(f))]
-            residuals_of = [target - _predicted(w, f) for w in candidates]
-            costs = [_cost(one) for one in residuals_of]
+            residuals_of = [target - _predict(w, f) for w in candidates]
+            costs = [_cost(residual) for residual in residuals_of]
             # The others have to be better by a sixteenth of a bit each.
             costs[0] -= target.size // 16
             best = costs.index(min(costs))
             weights[c, k, : len(f)] = candidates[best]
-            errors[c, k] = _rounded(residuals_of[best], rough)
+            errors[c, k] = _round(residuals_of[best], rough)
     return weights
 
 
-class _Sample:
+class _RowSample:
     """Some block rows of a plane, as they look when each of their texels is to be predicted."""
 
     def __init__(
@@ -179,36 +180,36 @@ class _Sample:
         self._y = y
         # Rows and columns -2 … 3 of every block, with all texels of the blocks unknown, and known.
         self._unknown = work[2 * y[:, None] + np.arange(6)].astype(np.int64)
-        known = _rounded(self._exact, max_error)
+        known = _round(self._exact, max_error)
         above = y > 0
         for row in (0, 1):
             self._unknown[above, row, 2 : 2 + width] = known[2 * y[above] - 2 + row]
         self._known = self._unknown.copy()
         self._known[:, 2:4, 2 : 2 + width] = known[2 * y[:, None] + np.arange(2)]
 
-    def of(self, k: int) -> tuple[list[Array], Array]:
+    def features(self, k: int) -> tuple[list[Array], Array]:
         """The ten neighbours of texel k of each block and itself, less the block's mean."""
-        base = self._at(self._unknown, 0, 0)
-        own = self._exact[2 * self._y + (k >> 1), k & 1 :: 2]
-        return [self._neighbour(k, *place) - base for place in NEIGHBOURS[k]], own - base
+        base = self._take(self._unknown, 0, 0)
+        target = self._exact[2 * self._y + (k >> 1), k & 1 :: 2]
+        return [self._neighbour(k, *place) - base for place in NEIGHBOURS[k]], target - base
 
     def _neighbour(self, k: int, dy: int, dx: int) -> Array:
         # To the left in the rows of the block, or in the block itself: known by now.
         known = 0 <= dy <= 1 and (dx < 0 or (dx <= 1 and 2 * dy + dx < k))
-        return self._at(self._known if known else self._unknown, dy, dx)
+        return self._take(self._known if known else self._unknown, dy, dx)
 
-    def _at(self, rows: Array, dy: int, dx: int) -> Array:
+    def _take(self, rows: Array, dy: int, dx: int) -> Array:
         end = 2 + dx + self._exact.shape[1]
         return rows[:, dy + 2, 2 + dx : end : 2]
 
 
-def _rounded(values: Array, max_error: int) -> Array:
+def _round(values: Array, max_error: int) -> Array:
     """Values with the errors to be expected."""
     step = 2 * max_error + 1
     return (values + max_error) // step * step if max_error else values
 
 
-def _predicted(weights: Array, features: Array) -> Array:
+def _predict(weights: Array, features: Array) -> Array:
     total = np.tensordot(weights, features, axes=1)
     half: int = 1 << WEIGHT_BITS - 1
     return np.asarray((total + half) >> WEIGHT_BITS)
@@ -220,7 +221,9 @@ def _solve(f: Array, target: Array, least: int) -> Array:
     scale = SCALE / (np.abs(f[:6]).sum(axis=0) / 4 + least)
     g = np.clip(np.rint(np.stack([*f, target]) * scale), -FEATURE_TOP, FEATURE_TOP)
     g = g.reshape(len(f) + 1, -1)
-    weights = fitted(g[:-1] @ g.T, WEIGHT_BITS, WEIGHT_TOP, ridge=SCALE * SCALE, share=12)
+    weights = solve_normal_equations(
+        g[:-1] @ g.T, WEIGHT_BITS, WEIGHT_TOP, ridge=SCALE * SCALE, share=12
+    )
     total = int(np.abs(weights).sum())
     if total <= WEIGHT_SUM:
         return weights
@@ -254,7 +257,7 @@ Numbers = NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
-class Plane:
+class PlaneNumbering:
     """The numbering of the values of one component.
 
     Attributes
@@ -288,7 +291,7 @@ class Plane:
             return self.used[numbers]
         return self.offset + numbers.astype(np.int64) * self.step
 
-    def packed(self) -> bytes:
+    def pack(self) -> bytes:
         """The bytes that follow its kind in a file."""
         if self.kind == LIST:
             return pack_varints(self.top, *np.diff(self.used, prepend=0).tolist())
@@ -297,7 +300,7 @@ class Plane:
         return pack_varints(self.grid) if self.kind == GRID else b""
 
 
-class Arrays(NamedTuple):
+class NumberingArrays(NamedTuple):
     """The same for the pass: by component, int64."""
 
     steps: Any  # (c,)
@@ -310,13 +313,13 @@ class Arrays(NamedTuple):
 class Numbering:
     """The numbering of the values of all components."""
 
-    def __init__(self, planes: Iterable[Plane]) -> None:
+    def __init__(self, planes: Iterable[PlaneNumbering]) -> None:
         self._planes = list(planes)
         longest = max(len(plane.used) for plane in self._planes)
         lists = [np.pad(p.used, (0, longest - len(p.used)), "edge") for p in self._planes]
         numbers = np.array([(p.step, p.offset, p.top, p.grid) for p in self._planes], np.int64)
         steps, offsets, tops, grids = np.ascontiguousarray(numbers.T)
-        self.arrays = Arrays(steps, offsets, tops, grids, np.stack(lists))
+        self.arrays = NumberingArrays(steps, offsets, tops, grids, np.stack(lists))
         #: Whether each value is its own number.
         self.plain = all(plane.kind == ITSELF for plane in self._planes)
         #: Most symbols of a sample.
@@ -324,18 +327,20 @@ class Numbering:
 
     def nearest(self, values: Numbers) -> Numbers:
         """Numbers of the occurring values nearest to any values (h, w, c)."""
-        return self._each(Plane.nearest, values)
+        return self._each(PlaneNumbering.nearest, values)
 
     def values(self, numbers: Numbers) -> Numbers:
         """Values (h, w, c) of numbers up to the top."""
-        return self._each(Plane.values, numbers)
+        return self._each(PlaneNumbering.values, numbers)
 
-    def packed(self) -> bytes:
+    def pack(self) -> bytes:
         """Two bits for the kind of each component, then the data of each."""
         kinds = sum(plane.kind << 2 * c for c, plane in enumerate(self._planes))
-        return bytes([kinds]) + b"".join(plane.packed() for plane in self._planes)
+        return bytes([kinds]) + b"".join(plane.pack() for plane in self._planes)
 
-    def _each(self, change: Callable[[Plane, Numbers], NDArray[Any]], numbers: Numbers) -> Numbers:
+    def _each(
+        self, change: Callable[[PlaneNumbering, Numbers], NDArray[Any]], numbers: Numbers
+    ) -> Numbers:
         if self.plain:
             return numbers
         planes = [change(plane, numbers[:, :, c]) for c, plane in enumerate(self._planes)]
@@ -345,25 +350,25 @@ class Numbering:
 def number_planes(values: Numbers, largest: int, max_error: int = 0) -> Numbering:
     """The numbering of values (h, w, c); each its own number if an error is allowed."""
     if max_error:
-        return Numbering([Plane(ITSELF, largest)] * values.shape[2])
+        return Numbering([PlaneNumbering(ITSELF, largest)] * values.shape[2])
     return Numbering(_number_plane(plane, largest) for plane in np.moveaxis(values, 2, 0))
 
 
-def _number_plane(values: Numbers, largest: int) -> Plane:
+def _number_plane(values: Numbers, largest: int) -> PlaneNumbering:
     plane = np.ascontiguousarray(values).reshape(-1)
     low, high = int(plane.min()), int(plane.max())
     if low == high:
-        return Plane(LATTICE, top=0, offset=low)
+        return PlaneNumbering(LATTICE, top=0, offset=low)
     step = int(np.gcd.reduce(plane - np.uint32(low)))
     used = _few_values(plane, 1 + (high - low) // step)
     if used is not None:
-        return Plane(LIST, len(used) - 1, step=0, used=used)
+        return PlaneNumbering(LIST, len(used) - 1, step=0, used=used)
     grid = _grid(plane, largest)
     if grid >= step.bit_length():
-        return Plane(GRID, largest, grid=grid)
+        return PlaneNumbering(GRID, largest, grid=grid)
     if step > 1:
-        return Plane(LATTICE, (high - low) // step, step, low)
-    return Plane(ITSELF, largest)
+        return PlaneNumbering(LATTICE, (high - low) // step, step, low)
+    return PlaneNumbering(ITSELF, largest)
 
 
 def _few_values(plane: Numbers, points: int) -> NDArray[np.int64] | None:
@@ -387,30 +392,30 @@ def _grid(plane: Numbers, largest: int) -> int:
     return grid
 
 
-def read_numbering(reader: Reader, components: int, largest: int) -> Numbering:
-    """The inverse of `Numbering.packed`. Raises InputError PTM-I112."""
+def read_numbering(reader: GroupReader, components: int, largest: int) -> Numbering:
+    """The inverse of `Numbering.pack`. Raises InputError PTM-I112."""
     kinds = reader.number(1)
     if kinds >> 2 * components:
-        raise damaged("a numbering is unknown")
+        raise group_error("a numbering is unknown")
     return Numbering(_read_plane(reader, kinds >> 2 * c & 3, largest) for c in range(components))
 
 
-def _read_plane(reader: Reader, kind: int, largest: int) -> Plane:
+def _read_plane(reader: GroupReader, kind: int, largest: int) -> PlaneNumbering:
     if kind == LATTICE:
         offset, step, top = (reader.varint() for _ in range(3))
         if step == 0 or offset + step * top > largest:
-            raise damaged("a lattice is impossible")
-        return Plane(LATTICE, top, step, offset)
+            raise group_error("a lattice is impossible")
+        return PlaneNumbering(LATTICE, top, step, offset)
     if kind == LIST:
         top = reader.varint()
         gaps = [reader.varint() for _ in range(top + 1)]
         used = np.cumsum(np.array(gaps, np.int64))
         if top == 0 or used[-1] > largest or min(gaps[1:]) == 0:
-            raise damaged("a list of values is impossible")
-        return Plane(LIST, top, step=0, used=used)
+            raise group_error("a list of values is impossible")
+        return PlaneNumbering(LIST, top, step=0, used=used)
     if kind == GRID:
         grid = reader.varint()
         if not 1 <= grid < largest.bit_length():
-            raise damaged("a grid is impossible")
-        return Plane(GRID, largest, grid=grid)
-    return Plane(ITSELF, largest)
+            raise group_error("a grid is impossible")
+        return PlaneNumbering(GRID, largest, grid=grid)
+    return PlaneNumbering(ITSELF, largest)

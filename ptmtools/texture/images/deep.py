@@ -23,16 +23,16 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import OutputError
 from ptmtools.lazy import component
-from ptmtools.texture.images.opening import ORIENTATION, load, one_frame, opened, stripped
+from ptmtools.texture.images.opening import ORIENTATION, load, one_frame, open_image, read_strips
 from ptmtools.texture.images.picture import (
     Picture,
     check_size,
     check_tile,
-    damaged_image,
-    oriented,
+    frames_error,
+    image_error,
+    orient,
     raster,
-    several,
-    unsupported,
+    samples_error,
 )
 from ptmtools.texture.model import Description, Limits
 
@@ -69,11 +69,11 @@ def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> P
         halves = [image]
     elif colour == _GREY_ALPHA:
         # Four bytes a texel, as RGBA has, and the same filters: the bytes as they are.
-        halves = [_unpacked(image, "RGBA", "RGBA")]
+        halves = [_unpack(image, "RGBA", "RGBA")]
     else:
         upper, lower = _HALVES[image.mode]
-        halves = [_unpacked(image, image.mode, upper)]
-        halves.append(_unpacked(opened(file, limits), image.mode, lower))
+        halves = [_unpack(image, image.mode, upper)]
+        halves.append(_unpack(open_image(file, limits), image.mode, lower))
 
     def texels(upper: Image, lower: Image | None = None) -> NDArray[Any]:
         samples: NDArray[Any] = np.asarray(upper)
@@ -84,10 +84,10 @@ def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> P
             samples = samples << 8 | np.asarray(lower)
         return samples.reshape(*samples.shape[:2], components)
 
-    return stripped(halves, components, "uint16", texels, key)
+    return read_strips(halves, components, "uint16", texels, key)
 
 
-def _unpacked(image: ImageFile, mode: str, raw: str) -> ImageFile:
+def _unpack(image: ImageFile, mode: str, raw: str) -> ImageFile:
     """An image loaded by an unpacker other than its own."""
     image._mode = mode
     image.tile = [tile._replace(args=raw) for tile in image.tile]
@@ -127,7 +127,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
     same = len(set(bits)) == len(set(formats)) == 1
     dtype = _TYPES.get((bits[0], formats[0])) if same else None
     if dtype is None or photometric not in (1, 2) or components > 4:
-        raise unsupported(
+        raise samples_error(
             f"{'/'.join(map(str, bits))} bits of TIFF sample format "
             f"{formats[0]}, photometric interpretation {photometric}"
         )
@@ -135,10 +135,10 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
     check_size(width, height, texel_bytes, limits)
     check_tile(tags.get(_TILE_WIDTH), tags.get(_TILE_HEIGHT), texel_bytes, limits)
     if components == 1 and dtype != "float16":
-        image = opened(file, limits)
+        image = open_image(file, limits)
         one_frame(image)
         load(image)
-        return stripped([image], 1, dtype, lambda strip: np.asarray(strip)[:, :, None])
+        return read_strips([image], 1, dtype, lambda strip: np.asarray(strip)[:, :, None])
     codecs = component(
         "imagecodecs",
         "PTM-M100",
@@ -146,15 +146,15 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         "codecs",
     )
     if tags[_NEXT] or tags.get(_DEPTH, 1) != 1:
-        raise several("several pages")
+        raise frames_error("several pages")
     file.seek(0)
     try:
         texels = codecs.tiff_decode(file.read(), index=0)
     except Exception as error:  # its errors have no class in common
-        raise damaged_image(error) from None
+        raise image_error(error) from None
     texels = texels.reshape(height, width, components).astype(dtype, copy=False)
     icc = tags.get(_ICC) or None
-    return Picture(oriented(texels, tags.get(ORIENTATION, 1)), Description(icc=icc))
+    return Picture(orient(texels, tags.get(ORIENTATION, 1)), Description(icc=icc))
 
 
 def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None:
@@ -181,7 +181,7 @@ def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:
     # Before memory is taken: each has a digit, and all but the last something after it.
     start, end = file.tell(), file.seek(0, 2)
     if end - start < 2 * count - 1:
-        raise damaged_image(f"after {end} bytes")
+        raise image_error(f"after {end} bytes")
     file.seek(start)
     samples = np.empty(count, np.uint16)
     have, rest = 0, b""
@@ -191,14 +191,14 @@ def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:
         # The last may go on in the next block.
         rest = words.pop() if words and block and not block[-1:].isspace() else b""
         if max(map(len, [*words, rest]), default=0) > _DIGITS_MAX:
-            raise damaged_image("a number is too long")
+            raise image_error("a number is too long")
         numbers = np.array([int(word) for word in words[: count - have]], np.int64)
         if numbers.size and not 0 <= numbers.min() <= numbers.max() <= 0xFFFF:
-            raise damaged_image("a sample is out of range")
+            raise image_error("a sample is out of range")
         samples[have : have + numbers.size] = numbers
         have += numbers.size
         if not block and have < count:
-            raise damaged_image(f"after {have} of {count} samples")
+            raise image_error(f"after {have} of {count} samples")
     return samples
 
 

@@ -20,7 +20,7 @@ from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
 from ptmtools.texture.images import deep, floats, opening
 from ptmtools.texture.images.opening import PNG, TIFF, pillow_faults
-from ptmtools.texture.images.picture import Picture, unsupported
+from ptmtools.texture.images.picture import Picture, samples_error
 from ptmtools.texture.images.png import check_chunks, save_png
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.sources import open_file
@@ -85,7 +85,7 @@ def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
     """Raises what `read_image` would raise, without unpacking texels: for an image that Pillow has
     decoded already."""
     file = cast("BinaryIO", io.BytesIO(source))
-    opened = _opened(file, None, limits)
+    opened = _open(file, None, limits)
     if isinstance(opened, Picture):
         check_depth(opened)
 
@@ -113,14 +113,14 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 
 
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
-    result = _opened(file, path, limits)
+    result = _open(file, path, limits)
     if isinstance(result, Picture):
         return result
     with pillow_faults():
         return result()
 
 
-def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
+def _open(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
     """A loaded image; for one of 8 bits, which Pillow has opened and accepted, a function that
     unpacks it."""
     first = file.read(HEAD_MAX)
@@ -139,10 +139,10 @@ def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Calla
         return floats.read_hdr(file, limits)
     if first.startswith(floats.OPENEXR_MAGIC):
         return floats.read_exr(file, path, limits)
-    return _by_pillow(file, path, first, limits)
+    return _open_by_pillow(file, path, first, limits)
 
 
-def _by_pillow(
+def _open_by_pillow(
     file: BinaryIO, path: str | None, first: bytes, limits: Limits
 ) -> Picture | Callable[[], Picture]:
     with pillow_faults():
@@ -152,22 +152,22 @@ def _by_pillow(
             check_chunks(file)
         if first.startswith(TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
             return deep.read_tiff(file, tags, limits)
-        image = opening.opened(file, limits)
+        image = opening.open_image(file, limits)
         opening.one_frame(image)
         depth = 8
         if first.startswith(PNG):
             depth, colour = first[24], first[25]
             if depth == 16:
                 return deep.read_png(file, image, colour, limits)
-        elif image.format == "PPM" and _rescaled(image.tile):
-            raise unsupported("samples that do not fill their bits")
+        elif image.format == "PPM" and _is_rescaled(image.tile):
+            raise samples_error("samples that do not fill their bits")
         elif opening.high_colour(image):
-            raise unsupported("samples of 5 or 6 bits")
+            raise samples_error("samples of 5 or 6 bits")
         opening.check(image, limits)
         return partial(opening.read, image, depth, opening.lossy_format(file, image))
 
 
-def _rescaled(tiles: list[Any]) -> bool:
+def _is_rescaled(tiles: list[Any]) -> bool:
     """Whether Pillow scales the samples of a PPM: a maximum of other than 255 and 1."""
     arguments = tiles[0].args if tiles else ()
     maximum = arguments[1] if isinstance(arguments, tuple) and len(arguments) > 1 else 0

@@ -31,11 +31,11 @@ from ptmtools.texture.images.picture import (
     check_file,
     check_size,
     check_tile,
-    damaged_image,
-    not_held,
+    format_error,
+    frames_error,
+    image_error,
     raster,
-    several,
-    unsupported,
+    samples_error,
 )
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.samples import KINDS
@@ -60,25 +60,25 @@ def read_hdr(file: BinaryIO, limits: Limits) -> Picture:
     end = data.find(b"\n\n", 0, _HEAD_MAX)
     size = _SIZE.match(data, end + 2) if end >= 0 else None
     if size is None:
-        raise damaged_image("in its head")
+        raise image_error("in its head")
     if b"32-bit_rle_xyze" in data[:end]:
-        raise unsupported("the colour model XYZ")
+        raise samples_error("the colour model XYZ")
     if (size[1], size[3]) != (b"-Y", b"+X"):
-        raise unsupported("rows that do not go from the top and left")
+        raise samples_error("rows that do not go from the top and left")
     height, width = int(size[2]), int(size[4])
     check_size(width, height, 12, limits)
     # A run codes at most 127 bytes in two.
     if (len(data) - size.end()) * 64 < 4 * width * height:
-        raise damaged_image(f"after {len(data)} bytes")
+        raise image_error(f"after {len(data)} bytes")
     texels = np.empty((height, width, 4), np.uint8)
     at = size.end()
     for row in texels:
         if width in _CODED and data[at : at + 4] == bytes([2, 2, width >> 8, width & 255]):
-            at = _coded_row(data, at + 4, row)
+            at = _read_coded_row(data, at + 4, row)
         else:
             flat = data[at : at + 4 * width]
             if len(flat) < 4 * width or _old_run(flat):
-                raise damaged_image(f"at byte {at}, or of the oldest kind")
+                raise image_error(f"at byte {at}, or of the oldest kind")
             row[:] = np.frombuffer(flat, np.uint8).reshape(width, 4)
             at += 4 * width
     return Picture(floats(texels))
@@ -106,8 +106,8 @@ def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Descriptio
             units = np.ldexp(texels.astype(np.float64), (8 - exponent)[:, :, None])
             mantissas[:, :, :3] = units
             mantissas[:, :, 3] = np.where(top > 0, exponent + 128, 0)
-    held = floats(mantissas)
-    if components != 3 or held.tobytes() != texels.astype(np.float32).tobytes():
+    stored = floats(mantissas)
+    if components != 3 or stored.tobytes() != texels.astype(np.float32).tobytes():
         raise OutputError(
             "PTM-O101",
             "a .hdr does not hold these texels exactly",
@@ -117,7 +117,7 @@ def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Descriptio
     file.write(head.encode() + mantissas.tobytes())
 
 
-def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
+def _read_coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
     """One run-length coded scanline into (w, 4); where the next one begins."""
     width = len(row)
     for channel in range(4):
@@ -125,7 +125,7 @@ def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
         while len(plane) < width:
             pair = data[at : at + 2]
             if len(pair) < 2:
-                raise damaged_image(f"after {len(data)} bytes")
+                raise image_error(f"after {len(data)} bytes")
             count, value = pair
             if count > 128:
                 plane += bytes([value]) * (count - 128)
@@ -133,11 +133,11 @@ def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
             else:
                 part = data[at + 1 : at + 1 + count]
                 if not count or len(part) < count:
-                    raise damaged_image(f"at byte {at}")
+                    raise image_error(f"at byte {at}")
                 plane += part
                 at += 1 + count
         if len(plane) > width:
-            raise damaged_image(f"at byte {at}")
+            raise image_error(f"at byte {at}")
         row[:, channel] = np.frombuffer(plane, np.uint8)
     return at
 
@@ -171,12 +171,12 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
             names = {channel.name for channel in head["channels"]}
             sampled = any((c.xSampling, c.ySampling) != (1, 1) for c in head["channels"])
     except Exception as error:  # its errors have no class in common
-        raise damaged_image(error) from None
+        raise image_error(error) from None
     if parts > 1:
-        raise several(f"{parts} parts", "export only the one you want")
+        raise frames_error(f"{parts} parts", "export only the one you want")
     wanted = next((order for order in _CHANNELS.values() if set(order) == names), None)
     if wanted is None or sampled:
-        raise unsupported(f"the channels {', '.join(sorted(names))}")
+        raise samples_error(f"the channels {', '.join(sorted(names))}")
     check_size(high[0] - low[0] + 1, high[1] - low[1] + 1, 4 * len(wanted), limits)
     if tiles is not None:
         check_tile(int(tiles.xSize), int(tiles.ySize), 4 * len(wanted), limits)
@@ -184,10 +184,10 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
         with library.File(path, separate_channels=True) as exr:
             planes = [exr.channels()[name].pixels for name in wanted]
     except Exception as error:
-        raise damaged_image(error) from None
+        raise image_error(error) from None
     types = {plane.dtype.name for plane in planes}
     if len(types) != 1 or not types <= {"float16", "float32"}:
-        raise unsupported(f"channels of {', '.join(sorted(types))}")
+        raise samples_error(f"channels of {', '.join(sorted(types))}")
     return Picture(np.stack(planes, axis=2))
 
 
@@ -197,7 +197,7 @@ def save_openexr(file: IO[bytes], texels: NDArray[Any], description: Description
     Raises MissingComponentError PTM-M100, OutputError PTM-O101.
     """
     if texels.dtype.kind != "f":
-        raise not_held("exr", texels, ".png, .npy or .tif")
+        raise format_error("exr", texels, ".png, .npy or .tif")
     library = _library()
     names = _CHANNELS[texels.shape[2]]
     channels = {name: np.ascontiguousarray(texels[:, :, i]) for i, name in enumerate(names)}
@@ -243,7 +243,7 @@ def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
             remedy="reshape it",
         )
     if dtype.name not in KINDS:
-        raise unsupported(f"samples of type {dtype}")
+        raise samples_error(f"samples of type {dtype}")
     height, width = shape[:2]
     check_size(width, height, components * dtype.itemsize, None if path is not None else limits)
     return Picture(raster(file, path, dtype, shape, "F" if in_columns else "C"))
@@ -265,6 +265,6 @@ def _head(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, in_columns, dtype = readers[npy.read_magic(head)](head)
     except Exception as error:  # a damaged head can make Python's parser raise nearly anything
-        raise damaged_image(f"in its head: {error}") from None
+        raise image_error(f"in its head: {error}") from None
     file.seek(head.tell())
     return shape, in_columns, dtype

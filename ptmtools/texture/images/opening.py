@@ -30,9 +30,9 @@ from ptmtools.texture.images.picture import (
     check_size,
     check_tile,
     check_webp,
-    damaged_image,
-    several,
-    unsupported,
+    frames_error,
+    image_error,
+    samples_error,
 )
 from ptmtools.texture.model import Description, Limits
 
@@ -69,7 +69,7 @@ _TILE_WIDTH, _TILE_LENGTH = 322, 323
 _HIGH_COLOUR = re.compile(r"BGRA?;(5|1[56])Z?")
 
 
-def opened(file: BinaryIO, limits: Limits) -> ImageFile:
+def open_image(file: BinaryIO, limits: Limits) -> ImageFile:
     """An image whose header is read, and no texel yet; its size is still to be checked.
 
     Raises what Pillow raises; LimitError PTM-L104 if opening or loading would take more memory than
@@ -94,9 +94,9 @@ def opened(file: BinaryIO, limits: Limits) -> ImageFile:
             image = cast("ImageFile", getattr(module, f"{name}ImageFile")(file))
     except SyntaxError as error:
         if "pixel mode" in str(error):
-            raise unsupported("a combination of samples that is not read") from None
+            raise samples_error("a combination of samples that is not read") from None
         if name not in _VAGUE:
-            raise damaged_image(error) from None
+            raise image_error(error) from None
         raise
     if name == "Tiff":
         tags: Any = image
@@ -155,10 +155,10 @@ def pillow_faults() -> Iterator[None]:
             "PTM-L104", f"has too many texels ({error})", remedy="scale it down first"
         ) from None
     except Exception as error:  # a damaged file can make its parsers raise nearly anything
-        raise damaged_image(str(error) or type(error).__name__) from None
+        raise image_error(str(error) or type(error).__name__) from None
 
 
-def described(image: Image) -> Description:
+def description_of(image: Image) -> Description:
     """Colour and orientation of an image that is loaded (PNG has some of it behind the texels)."""
     info = image.info
     points, gamma = info.get("chromaticity"), info.get("gamma")
@@ -189,7 +189,7 @@ _COMPONENTS = {"1": 1, "L": 1, "LA": 2, "P": 3, "PA": 4, "RGB": 3, "RGBA": 4}
 def check(image: ImageFile, limits: Limits) -> None:
     """Raise InputError PTM-I126, LimitError PTM-L104 if an opened image cannot be read exactly."""
     if image.mode not in _COMPONENTS:
-        raise unsupported(f"the colour model {image.mode}")
+        raise samples_error(f"the colour model {image.mode}")
     check_size(*image.size, _COMPONENTS[image.mode], limits)
 
 
@@ -208,10 +208,10 @@ def read(image: ImageFile, depth: int, lossy: str | None) -> Picture:
         has_alpha |= image.palette is not None and image.palette.mode == "RGBA"
         components += has_alpha
         key = None
-    return stripped([image], components, "uint8", partial(_texels, components), key, lossy)
+    return read_strips([image], components, "uint8", partial(_texels, components), key, lossy)
 
 
-def stripped(
+def read_strips(
     images: Sequence[Image],
     components: int,
     dtype: str,
@@ -236,14 +236,14 @@ def stripped(
         return np.concatenate([texels, alpha[:, :, None]], axis=2)
 
     shape = (height, width, components + keyed)
-    return Picture(Strips(shape, np.dtype(dtype), strip), described(images[0]), lossy)
+    return Picture(Strips(shape, np.dtype(dtype), strip), description_of(images[0]), lossy)
 
 
 def one_frame(image: ImageFile) -> None:
     """Raise InputError PTM-I126 for an image of several."""
     # The frames are not counted: a TIFF may be built so that counting its pages is costly.
     if getattr(image, "is_animated", False):
-        raise several("several frames or pages")
+        raise frames_error("several frames or pages")
 
 
 def _texels(components: int, strip: Image) -> NDArray[Any]:

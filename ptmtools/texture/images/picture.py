@@ -24,7 +24,7 @@ import numpy as np
 
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.texture.model import MAX_SIDE, Description, Limits
-from ptmtools.texture.sources import Rows, Samples
+from ptmtools.texture.sources import RowSource, Samples
 
 #: Texels taken from an image at a time, about.
 _STRIP_TEXELS = 1 << 18
@@ -42,7 +42,7 @@ class Picture:
     lossy: the name of the file's format if it discards detail, as JPEG does; else None.
     """
 
-    texels: Rows
+    texels: RowSource
     description: Description = Description()  # noqa: RUF009  # frozen
     lossy: str | None = None
 
@@ -56,11 +56,11 @@ class Picture:
         """The orientation applied to the texels; they are then all in memory."""
         if self.description.orientation == 1:
             return self
-        texels = oriented(self.array(), self.description.orientation)
+        texels = orient(self.array(), self.description.orientation)
         return replace(self, texels=texels, description=replace(self.description, orientation=1))
 
 
-def oriented(texels: Samples, orientation: int) -> Samples:
+def orient(texels: Samples, orientation: int) -> Samples:
     """Texels in display order, given EXIF's orientation, 1 to 8; a view."""
     if orientation in (5, 6, 7, 8):
         texels = texels.swapaxes(0, 1)
@@ -106,7 +106,7 @@ def raster(
     start, end = file.tell(), file.seek(0, 2)
     size = math.prod(shape) * dtype.itemsize
     if end - start < size:
-        raise damaged_image(f"after {end} of {start + size} bytes")
+        raise image_error(f"after {end} of {start + size} bytes")
     if path is not None:
         return np.memmap(path, dtype, "r", start, shape, order)
     file.seek(start)
@@ -119,7 +119,7 @@ def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None)
     limits: None if no memory is taken. Raises InputError PTM-I125 for no texels at all.
     """
     if min(width, height) < 1:
-        raise damaged_image("no texels")
+        raise image_error("no texels")
     if max(width, height) > MAX_SIDE:
         raise LimitError(
             "PTM-L104",
@@ -135,7 +135,7 @@ def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None)
         )
 
 
-def damaged_image(what: object) -> InputError:
+def image_error(what: object) -> InputError:
     """The error for a file that ends too early or contradicts itself."""
     return InputError(
         "PTM-I125",
@@ -144,12 +144,12 @@ def damaged_image(what: object) -> InputError:
     )
 
 
-def several(what: str, remedy: str = "export the one you want as PNG") -> InputError:
+def frames_error(what: str, remedy: str = "export the one you want as PNG") -> InputError:
     """The error for a file of more than one image."""
     return InputError("PTM-I126", f"holds {what}; a texture is one image", remedy=remedy)
 
 
-def unsupported(what: str) -> InputError:
+def samples_error(what: str) -> InputError:
     """The error for samples that no kind holds exactly."""
     return InputError(
         "PTM-I126",
@@ -159,7 +159,7 @@ def unsupported(what: str) -> InputError:
     )
 
 
-def not_held(suffix: str, texels: Samples, others: str) -> OutputError:
+def format_error(suffix: str, texels: Samples, others: str) -> OutputError:
     """The error for an image format without such samples; ``others`` have them."""
     return OutputError(
         "PTM-O101",
@@ -236,5 +236,5 @@ def check_tile(width: object, height: object, texel_bytes: int, limits: Limits) 
     if width is None and height is None:
         return
     if not (isinstance(width, int) and isinstance(height, int)):
-        raise damaged_image("in the size of its tiles")
+        raise image_error("in the size of its tiles")
     check_size(width, height, texel_bytes, limits)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.images.opening import ORIENTATION, PNG
-from ptmtools.texture.images.picture import damaged_image, not_held
+from ptmtools.texture.images.picture import format_error, image_error
 from ptmtools.texture.model import Description
 
 #: Colour type by number of components.
@@ -37,7 +37,7 @@ def png_bytes(image: NDArray[Any], description: Description = _PLAIN) -> bytes:
 def save_png(file: IO[bytes], image: NDArray[Any], description: Description = _PLAIN) -> None:
     """As `png_bytes`, into an open file. Raises OutputError PTM-O101 for floats."""
     if image.dtype.kind == "f":
-        raise not_held("png", image, ".npy, .tif or .exr")
+        raise format_error("png", image, ".npy, .tif or .exr")
     (_save_deep if image.dtype.itemsize > 1 else _save_shallow)(file, image, description)
 
 
@@ -71,7 +71,7 @@ def _save_deep(file: IO[bytes], image: NDArray[np.uint16], description: Descript
     if description.orientation != 1:
         put(b"eXIf", _exif(description.orientation).removeprefix(b"Exif\0\0"))
     packer = zlib.compressobj(_DEFLATE_LEVEL, zlib.DEFLATED, 15, 9)
-    for strip in _filtered(image):
+    for strip in _filter_rows(image):
         if packed := packer.compress(strip):
             put(b"IDAT", packed)
     put(b"IDAT", packer.flush())
@@ -88,22 +88,22 @@ def check_chunks(file: BinaryIO) -> None:
     kind = b""
     while kind != b"IEND":
         head = file.read(8)
-        kind, left = head[4:], int.from_bytes(head[:4], "big")
+        kind, remaining = head[4:], int.from_bytes(head[:4], "big")
         if kind[:1].islower():  # texels do not depend on it
-            file.seek(left + 4, 1)
+            file.seek(remaining + 4, 1)
             continue
         checksum = zlib.crc32(kind)
-        while left and (part := file.read(min(left, _STRIP_BYTES))):
+        while remaining and (part := file.read(min(remaining, _STRIP_BYTES))):
             checksum = zlib.crc32(part, checksum)
-            left -= len(part)
+            remaining -= len(part)
         stored = file.read(4)
         if len(stored) < 4:
-            raise damaged_image("it ends before its chunk IEND")
+            raise image_error("it ends before its chunk IEND")
         if stored != checksum.to_bytes(4, "big"):
-            raise damaged_image(f"the checksum of {kind!r} before byte {file.tell()} is wrong")
+            raise image_error(f"the checksum of {kind!r} before byte {file.tell()} is wrong")
 
 
-def _filtered(image: NDArray[np.uint16]) -> Iterator[bytes]:
+def _filter_rows(image: NDArray[np.uint16]) -> Iterator[bytes]:
     """Rows as PNG has them before deflating: number of the filter, filtered bytes."""
     height, width, components = image.shape
     texel = 2 * components
@@ -113,32 +113,38 @@ def _filtered(image: NDArray[np.uint16]) -> Iterator[bytes]:
         rows = image[first : y + step].astype(">u2").view(np.uint8).reshape(-1, width * texel)
         padded = np.zeros((len(rows) + (y == 0), (width + 1) * texel), np.uint8)
         padded[y == 0 :, texel:] = rows
-        here, left = padded[1:, texel:], padded[1:, :-texel]
-        above, corner = padded[:-1, texel:], padded[:-1, :-texel]
-        mean = (left.astype(np.uint16) + above) >> 1
+        current, west = padded[1:, texel:], padded[1:, :-texel]
+        north, corner = padded[:-1, texel:], padded[:-1, :-texel]
+        mean = (west.astype(np.uint16) + north) >> 1
         filtered = np.stack(
-            [here, here - left, here - above, here - mean, here - _paeth(left, above, corner)],
+            [
+                current,
+                current - west,
+                current - north,
+                current - mean,
+                current - _paeth(west, north, corner),
+            ],
             dtype=np.uint8,
             casting="unsafe",
         )
         cost = np.abs(filtered.view(np.int8).astype(np.int16)).sum(axis=2)
         best = cost.argmin(axis=0)
-        out = np.empty((len(here), 1 + width * texel), np.uint8)
+        out = np.empty((len(current), 1 + width * texel), np.uint8)
         out[:, 0] = best
-        out[:, 1:] = filtered[best, np.arange(len(here))]
+        out[:, 1:] = filtered[best, np.arange(len(current))]
         yield out.tobytes()
 
 
 def _paeth(
-    left: NDArray[np.uint8], above: NDArray[np.uint8], corner: NDArray[np.uint8]
+    west: NDArray[np.uint8], north: NDArray[np.uint8], corner: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Whichever of the three is nearest to left + above - corner."""
-    a, b, c = (part.astype(np.int16) for part in (left, above, corner))
-    to_left, to_above, to_corner = abs(b - c), abs(a - c), abs(a + b - 2 * c)
+    a, b, c = (part.astype(np.int16) for part in (west, north, corner))
+    to_west, to_north, to_corner = abs(b - c), abs(a - c), abs(a + b - 2 * c)
     return np.where(
-        (to_left <= to_above) & (to_left <= to_corner),
-        left,
-        np.where(to_above <= to_corner, above, corner),
+        (to_west <= to_north) & (to_west <= to_corner),
+        west,
+        np.where(to_north <= to_corner, north, corner),
     )
 
 

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.coders import haar, repeats, texel
 from ptmtools.texture.coders.group import (
-    Reader,
-    damaged,
+    GroupReader,
     decode_differences,
+    group_error,
     inflate,
     pack_levels,
     shapes_to,
@@ -58,24 +58,24 @@ def encode_base(level: Samples) -> bytes:
     """One byte that names the coder, then what it wrote."""
     levels = build_pyramid(level)
     nested = bytes([PYRAMID]) + pack_levels(
-        encode_tile, _nothing(levels[0].shape, level.dtype), levels
+        encode_tile, _empty_below(levels[0].shape, level.dtype), levels
     )
     return min(nested, bytes([STORED]) + raw.encode_base(level), key=len)
 
 
 def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     coder = reader.number(1)
     if coder == PYRAMID:
         shapes = shapes_to(shape)
-        return unpack_levels(decode_tile, reader, _nothing(shapes[0], dtype), shapes)
+        return unpack_levels(decode_tile, reader, _empty_below(shapes[0], dtype), shapes)
     body = reader.rest()
     if coder == DEFLATED_1:
         return raw.decode_base(inflate(body, shape[0] * shape[1] * shape[2]), shape, dtype)
     if coder == STORED:
         return raw.decode_base(body, shape, dtype)
-    raise damaged(f"coder {coder} is unknown for the coarsest level")
+    raise group_error(f"coder {coder} is unknown for the coarsest level")
 
 
 def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
@@ -123,7 +123,7 @@ def _probe(level: Bytes, below: Bytes) -> tuple[Bytes, Bytes]:
 
 
 def _decode_bytes(data: Data, below: Bytes, shape: Shape) -> Bytes:
-    reader = Reader(data)
+    reader = GroupReader(data)
     coder, body = reader.number(1), reader.rest()
     if coder == REPEATS:
         return repeats.decode(body, below, shape)
@@ -135,9 +135,9 @@ def _decode_bytes(data: Data, below: Bytes, shape: Shape) -> Bytes:
         return raw.decode_tile(inflate(body, group_length(shape)), below, shape).texels
     if coder == STORED:
         return raw.decode_tile(body, below, shape).texels
-    raise damaged(f"coder {coder} is unknown")
+    raise group_error(f"coder {coder} is unknown")
 
 
-def _nothing(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Samples:
+def _empty_below(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Samples:
     """The empty level below a level whose shorter side is 1."""
     return np.zeros((shape[0] >> 1, shape[1] >> 1, shape[2]), dtype)

@@ -19,7 +19,7 @@ import numpy as np
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
 from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
-from ptmtools.texture.coders.group import Reader, damaged
+from ptmtools.texture.coders.group import GroupReader, group_error
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import (
     corners,
@@ -76,19 +76,19 @@ def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
 def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
     codecs = _codecs(below.dtype)
-    reader = Reader(data)
+    reader = GroupReader(data)
     form = reader.number(1)
     if form == RAW:
         return raw.decode_tile(reader.rest(), below, shape)
     if form != JPEG or not below.size:
-        raise damaged("its form is unknown")
+        raise group_error("its form is unknown")
     level = np.empty(shape, below.dtype)
     codes = read_pairs(reader, below)
     for edge in _edges(level):
         edge[:] = reader.texels(edge.shape, below.dtype)
     for texels in corners(level, below)[:3]:
         jpeg = bytes(reader.take(reader.number(_LENGTH)))
-        texels[:] = _decoded(codecs, jpeg, texels)
+        texels[:] = _decode_jpeg(codecs, jpeg, texels)
     reader.end()
     place_last(level, below, codes, b"")
     return Tile(b"", level)
@@ -117,15 +117,15 @@ def _plain(texels: Samples) -> Samples:
     return copy[:, :, 0] if copy.shape[2] == 1 else copy
 
 
-def _decoded(codecs: Any, jpeg: bytes, like: Samples) -> Samples:
+def _decode_jpeg(codecs: Any, jpeg: bytes, like: Samples) -> Samples:
     """Decodes a JPEG, which must have this size and type. Raises InputError PTM-I112."""
     _check_frame(jpeg, like)
     try:
         decoded: Samples = codecs.jpeg8_decode(jpeg)
     except (RuntimeError, ValueError) as error:
-        raise damaged(f"its JPEG is damaged ({error})") from None
+        raise group_error(f"its JPEG is damaged ({error})") from None
     if decoded.dtype != like.dtype or decoded.size != like.size:
-        raise damaged("its JPEG is of another size")
+        raise group_error("its JPEG is of another size")
     return decoded.reshape(like.shape)
 
 
@@ -148,4 +148,4 @@ def _check_frame(jpeg: bytes, like: Samples) -> None:
         if marker != b"\xc4" and not b"\xe0" <= marker <= b"\xef":
             break
         at += 2 + size
-    raise damaged("its JPEG is not the one that was expected")
+    raise group_error("its JPEG is not the one that was expected")

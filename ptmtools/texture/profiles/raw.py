@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
-from ptmtools.texture.coders.group import Reader, damaged
+from ptmtools.texture.coders.group import GroupReader, group_error
 from ptmtools.texture.samples import from_ordered, kind_of, round_to, to_ordered
 
 #: Correction codes 0, 1, 2 stand for 0, -1, +1 units in the last place; this one for an escape.
@@ -37,7 +37,7 @@ def encode_base(level: Samples) -> bytes:
 
 def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112 if the length is wrong."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     level = reader.texels(shape, dtype)
     reader.end()
     return level
@@ -51,7 +51,7 @@ def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
 
 def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile` (paper Eq. 3). Raises InputError PTM-I112."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     codes = read_pairs(reader, below)
     level = np.empty(shape, below.dtype)
     partial = level.size - below.size
@@ -156,7 +156,7 @@ def pack_pairs(codes: NDArray[np.uint8]) -> bytes:
     return (four[:, 0] | four[:, 1] << 2 | four[:, 2] << 4 | four[:, 3] << 6).tobytes()
 
 
-def read_pairs(reader: Reader, below: Samples) -> NDArray[np.uint8]:
+def read_pairs(reader: GroupReader, below: Samples) -> NDArray[np.uint8]:
     """The inverse of `pack_pairs`: a code for every sample of ``below``."""
     packed = reader.numbers("u1", -(-below.size // 4))
     codes = np.stack([packed >> shift & 3 for shift in (0, 2, 4, 6)], axis=1)
@@ -168,17 +168,17 @@ def _pack_numbers(numbers: NDArray[Any]) -> bytes:
 
     A last odd nibble is filled up with 0.
     """
-    left = numbers.astype(np.uint64)
-    count = np.ones(len(left), np.int64)
+    rest = numbers.astype(np.uint64)
+    count = np.ones(len(rest), np.int64)
     for shift in range(3, 33, 3):
-        count += left >> np.uint64(shift) > 0
+        count += rest >> np.uint64(shift) > 0
     first = np.cumsum(count) - count
     total = int(count.sum())
     nibbles = np.zeros(total + total % 2, np.uint8)
-    while len(left):
-        more = left > 7
-        nibbles[first] = (left & np.uint64(7)).astype(np.uint8) | (more.astype(np.uint8) << 3)
-        left, first = left[more] >> np.uint64(3), first[more] + 1
+    while len(rest):
+        more = rest > 7
+        nibbles[first] = (rest & np.uint64(7)).astype(np.uint8) | (more.astype(np.uint8) << 3)
+        rest, first = rest[more] >> np.uint64(3), first[more] + 1
     return (nibbles[::2] | nibbles[1::2] << 4).tobytes()
 
 
@@ -189,20 +189,20 @@ def _unpack_numbers(data: Data, n: int, bits: int) -> NDArray[np.uint64]:
     last = np.flatnonzero(nibbles < 8)
     # One more where the last nibble only fills up its byte.
     if not n <= len(last) <= n + 1 or (len(nibbles) and nibbles[-1] > 7):
-        raise damaged("its escapes are not as many as its residuals say")
+        raise group_error("its escapes are not as many as its residuals say")
     used = int(last[n - 1]) + 1 if n else 0
     if used + used % 2 != len(nibbles) or nibbles[used:].any():
-        raise damaged("its escapes are not as many as its residuals say")
+        raise group_error("its escapes are not as many as its residuals say")
     last = last[:n]
     first = np.concatenate([[0], last[:-1] + 1]) if n else last
     count = last - first + 1
     numbers = np.zeros(n, np.uint64)
     for i in range(int(count.max(initial=0))):
         if 3 * i > bits:
-            raise damaged("an escape is too large")
+            raise group_error("an escape is too large")
         some = count > i
         digit = (nibbles[first[some] + i] & 7).astype(np.uint64)
         numbers[some] |= digit << np.uint64(3 * i)
     if n and int(numbers.max()) >> bits:
-        raise damaged("an escape is too large")
+        raise group_error("an escape is too large")
     return numbers

@@ -13,7 +13,13 @@ import numpy as np
 
 from ptmtools.texture.coder import PLAIN, Coding, Data, Samples, Shape, Tile
 from ptmtools.texture.coders import mixing, texel
-from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
+from ptmtools.texture.coders.group import (
+    GroupReader,
+    group_error,
+    pack_levels,
+    shapes_to,
+    unpack_levels,
+)
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.pyramid import build_pyramid
 
@@ -32,7 +38,7 @@ def encode_base(level: Samples) -> bytes:
 def decode_base(data: Data, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
     coarsest, *finer = shapes_to(shape)
-    reader = Reader(data)
+    reader = GroupReader(data)
     return unpack_levels(decode_tile, reader, reader.texels(coarsest, dtype), finer)
 
 
@@ -53,7 +59,7 @@ def encode_tile(level: Samples, below: Samples, coding: Coding = PLAIN) -> Tile:
 
 def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
-    reader = Reader(data)
+    reader = GroupReader(data)
     coder, eight_bits = reader.number(1), below.dtype == np.uint8
     if coder == STORED:
         return Tile(b"", raw.decode_base(reader.rest(), shape, below.dtype), coding.memory)
@@ -63,4 +69,4 @@ def decode_tile(data: Data, below: Samples, shape: Shape, coding: Coding = PLAIN
         return Tile(b"", *mixing.decode_mixing(reader.rest(), below, shape, coding))
     if coder == EVEN and eight_bits and coding.max_error == 0:
         return Tile(b"", mixing.decode_even(reader.rest(), below, shape), coding.memory)
-    raise damaged(f"coder {coder} is unknown here")
+    raise group_error(f"coder {coder} is unknown here")

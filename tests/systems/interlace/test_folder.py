@@ -278,7 +278,7 @@ def test_what_fails_leaves_what_was(
     elif fails == "put":
         monkeypatch.setattr(os, "fsync", fail)
     else:
-        monkeypatch.setattr("ptmtools.whole_folder.exchanged", lambda *_: False)
+        monkeypatch.setattr("ptmtools.whole_folder.exchange", lambda *_: False)
         monkeypatch.setattr(
             os, "rename", lambda a, b: (fail if str(a).endswith(".part") else rename)(a, b)
         )

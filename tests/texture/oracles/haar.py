@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders import haar_layout as layout
-from ptmtools.texture.coders.group import Reader, plane_order, references
+from ptmtools.texture.coders.group import GroupReader, plane_order, reference_counts
 from tests.texture.oracles.rans import Symbols, read_tables
 
 Row = list[int]
@@ -28,13 +28,13 @@ def decode_haar(
     """The level (h, w, c) that a Haar-coded group (without its first byte) refines ``below`` to."""
     height, width, components = shape
     bh, bw = height >> 1, width >> 1
-    reader = Reader(group)
+    reader = GroupReader(group)
     flags = reader.number(1)
     values: list[Row] = []
     for c in range(components):
         bitmap = reader.number(32 if flags >> (4 + c) & 1 else 0)
         values.append([v for v in range(256) if bitmap >> v & 1])
-    order, count = plane_order(components).tolist(), references(components).tolist()
+    order, count = plane_order(components).tolist(), reference_counts(components).tolist()
     weights = [[list(map(int, layout.BUILT_IN_WEIGHTS[n][k])) for k in range(3)] for n in count]
     if flags & 1:
         for c, n in enumerate(count):

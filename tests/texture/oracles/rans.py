@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptmtools.texture.coders.group import Reader
+from ptmtools.texture.coders.group import GroupReader
 from ptmtools.texture.coders.rans import BUILT_IN_MEANS
 
 Row = list[int]
@@ -17,7 +17,7 @@ class Symbols:
     """The four rANS states over their words, and the escapes."""
 
     def __init__(
-        self, reader: Reader, tables: list[Row], plain: int = 256, version_1: bool = False
+        self, reader: GroupReader, tables: list[Row], plain: int = 256, version_1: bool = False
     ) -> None:
         self._escapes = iter(reader.numbers("<u2", reader.number(4)).tolist())
         words = np.frombuffer(reader.rest(), "<u2").tolist()
@@ -61,7 +61,7 @@ def built_in(kind: int) -> Row:
 
 
 def read_tables(
-    reader: Reader,
+    reader: GroupReader,
     count: int,
     version_1: bool = False,
     family: Callable[[int], Row] = built_in,

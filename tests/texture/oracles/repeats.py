@@ -11,7 +11,7 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.group import Reader, plane_order
+from ptmtools.texture.coders.group import GroupReader, plane_order
 from tests.texture.oracles.haar import by_value, edge
 from tests.texture.oracles.rans import Symbols, read_tables
 
@@ -28,7 +28,7 @@ def decode_repeats(
     group: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
 ) -> NDArray[np.uint8]:
     """The level (h, w, c) that a group (without its first byte) refines ``below`` to."""
-    reader = Reader(group)
+    reader = GroupReader(group)
     return _Level(below, shape, Symbols(reader, read_tables(reader, 196))).decode()
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders import texel_layout as layout
-from ptmtools.texture.coders.group import Reader, plane_order, references
+from ptmtools.texture.coders.group import GroupReader, plane_order, reference_counts
 from tests.texture.oracles.rans import Symbols, normalised, read_tables
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236
@@ -38,7 +38,7 @@ class _Decoder:
         self.shape, self.max_error, self.dtype = shape, max_error, below.dtype
         self.letter = {"float16": "e", "float32": "f"}.get(below.dtype.name, "")
         self.bits = 8 * below.dtype.itemsize
-        read = Reader(group)
+        read = GroupReader(group)
         sent = read.number(1) == 3
         components = shape[2]
         kinds = read.number(1)
@@ -56,7 +56,7 @@ class _Decoder:
                 self.grids[c] = read.varint()
         self.window = read.number(1)
         self.order = plane_order(components).tolist()
-        self.references = references(components).tolist()
+        self.references = reference_counts(components).tolist()
         self.weights = [layout.BUILT_IN_WEIGHTS[n].tolist() for n in self.references]
         if sent:
             for c, n in enumerate(self.references):
