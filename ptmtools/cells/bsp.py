@@ -8,7 +8,8 @@ plane. The plane with the best score
 splits it; nodes are split in the order of the wall area that their best plane brings. Where no wall
 is left, reveals may split, then door leaves, then caps (`split_planes`). A side thinner than a leaf
 may be is refused, so that no leaf is flat after rounding to float32; where a side would be thinner
-than the cluster distance, the wall must close an opening of the near boundary.
+than the cluster distance, the wall must close an opening of the near boundary, or be the other face
+of a thin wall (`_seals`), for which it waits until no other wall splits.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ptmtools.arrays import Bools, Floats, ranges
 from ptmtools.cells import split_planes as caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.planar import Geometry, difference, intersection
+from ptmtools.cells.planar import Geometry, buffer, difference, intersection, left_open
 from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.split_planes import DoorPlanes, Reveals
 from ptmtools.cells.structure import Structure, WallPlane
@@ -133,6 +134,8 @@ def build_tree(
         body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
     ) -> None:
         best = _best_split(body, fragments, least[source], taken, tolerance)
+        if best < 0 and source == _WALLS:
+            best = _best_split(body, fragments, least[source], taken, tolerance, sheets=True)
         while best < 0 and source < _CAPS:
             source += 1
             if source == _REVEALS:
@@ -288,8 +291,11 @@ def _best_split(
     least: float,
     taken: list[WallPlane],
     tolerance: Tolerance,
+    sheets: bool = False,
 ) -> int:
-    """Index of the fragment whose plane splits best, or -1."""
+    """Index of the fragment whose plane splits best, or -1. Fragments nearer to a boundary than the
+    cluster distance split if they close an opening of it, or, with ``sheets``, the wall between
+    (`_seals`)."""
     if not fragments:
         return -1
     extents = _Extents(fragments)
@@ -305,9 +311,11 @@ def _best_split(
         depth = min(reach.max(), -reach.min())
         if depth < tolerance.thin:
             continue
-        if depth < tolerance.cluster and _closes(body, f, taken, tolerance) < max(
-            least, tolerance.hairline**2
-        ):
+        near = depth < tolerance.cluster
+        if near and sheets:
+            if not _seals(body, f, taken, tolerance):
+                continue
+        elif near and _closes(body, f, taken, tolerance) < max(least, tolerance.hairline**2):
             continue
         front, back = extents.ahead(plane, tolerance), extents.ahead(-plane, tolerance)
         others = len(fragments) - 1
@@ -349,3 +357,29 @@ def _closes(
             )
             return float(shapely.area(difference(moved, taken[tag].blocking, tolerance.grid)))
     return fragment.area
+
+
+def _seals(
+    body: Polyhedron, fragment: _Fragment, taken: list[WallPlane], tolerance: Tolerance
+) -> bool:
+    """Whether the slab between a fragment and the boundary near it is open where the edge of the
+    fragment meets another side of the body: the inside of a thin wall, at whose faces floor and
+    roof end. The slab behind a picture or a panelling is closed there."""
+    frame = fragment.wall.frame
+    height = body.points @ frame.plane[:3] + frame.plane[3]
+    inward = frame.plane if height.max() < -height.min() else -frame.plane
+    reach = buffer(fragment.shape, tolerance.plane, more=True)
+    for loop, tag in zip(body.faces, body.tags, strict=True):
+        if tag < 0:
+            continue
+        side = taken[tag]
+        strip = clip_polygon(body.points[loop], inward, tolerance.rounding)
+        if len(strip) < 3 or abs(side.frame.plane[:3] @ inward[:3]) >= tolerance.cosine:
+            continue
+        strip = shapely.polygons(side.frame.to_plane(strip))
+        for part in shapely.get_parts(left_open(strip, side.blocking, tolerance)):
+            rim = frame.to_plane(side.frame.to_space(shapely.get_coordinates(part)))
+            edge = shapely.intersection(shapely.MultiPoint(rim).convex_hull, reach)
+            if shapely.length(edge) > tolerance.hairline:
+                return True
+    return False

@@ -49,6 +49,32 @@ def test_walls_with_hardly_any_thickness(quads, room_faces, partition, thick: fl
     assert_sound(scene, cells)
 
 
+@pytest.mark.parametrize(
+    ("long", "thick"), [(8, 1e-4), (8, 1e-3), (8, 5e-3), (80, 1e-3), (80, 0.03), (80, 0.05)]
+)
+def test_thin_walls_are_walls(quads, room_faces, partition, long: float, thick: float) -> None:
+    """Two rooms whose floors and roofs end at the faces of the wall between them: were the inside
+    of the wall part of a room, that would be open to the outside."""
+    one = room_faces((4 - long / 2, 0, -2), (4, 4, 2), "+x")
+    other = room_faces((4 + thick, 0, -2), (4 + thick + long / 2, 4, 2), "-x")
+    sheets = [face for x in (4, 4 + thick) for face in partition(x, (0, 3, -1, 1))]
+    reveals = room_faces((4, 0, -1), (4 + thick, 3, 1), "-x +x")
+    scene = quads(one + other + sheets + reveals)
+    cells = subdivide(scene, LEAF)
+    assert cells.closed
+    volumes = [6 * thick, 8 * long, 8 * long]
+    assert np.sort(cells.leaf_volumes()) == pytest.approx(volumes, rel=1e-3)
+    assert cells.portal_area == pytest.approx([6.0, 6.0], rel=1e-4)
+    assert_sound(scene, cells)
+
+
+def test_what_hangs_on_a_wall_is_no_wall(quads, room_faces, partition) -> None:
+    """A panel that stands on the floor, with a slit behind it which the floor closes."""
+    panel = [[[7.995, y, z] for y, z in ((0, -1), (1.5, -1), (1.5, 1), (0, 1))]]
+    scene = quads(room_faces(LOW, HIGH) + partition(4, (0, 3, -1, 1)) + panel)
+    assert subdivide(scene, LEAF).leaf_count == 2
+
+
 def test_a_wall_of_a_hundred_thousand_slivers(quads, room_faces) -> None:
     """Strips as a triangulator may leave them, all in one plane, beside a door."""
     count = 25_000

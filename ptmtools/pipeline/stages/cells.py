@@ -46,7 +46,7 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 CELLS: Stage[Cells] = Stage(
     name="cells",
     about="Read a model and divide its space into cells and portals.",
-    recipe=8,
+    recipe=9,
     options=SubdivideOptions,
     reads=(SCENE,),
     changed="division ends where it saves visitors little (--gain); cells are walkable space, or "

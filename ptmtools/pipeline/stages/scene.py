@@ -351,7 +351,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=10,
+    recipe=11,
     changed="the list of images has their sizes",
     options=IngestOptions,
     inputs=_inputs,
