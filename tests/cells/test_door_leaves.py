@@ -91,6 +91,13 @@ def test_a_name_alone_makes_no_door(hole: Hole, things: dict[str, Faces]) -> Non
     assert not together(subdivide(made), A, B)
 
 
+@pytest.mark.parametrize("name", ["door_1", "infill"])
+def test_a_leaf_is_thinner_than_a_panel_of_the_wall(name: str) -> None:
+    """By name and by shape; both are set back from the faces of a wall of 20 cm."""
+    assert leaf_names(scene(rooms(), **{name: leaf(4.045, thickness=0.11)})) == [name]
+    assert leaf_names(scene(rooms(), **{name: leaf(4.035, thickness=0.13)})) == []
+
+
 def test_a_hatch_in_the_floor_is_no_door_unless_asked_for() -> None:
     # Two rooms over one another, and a hatch between them.
     below, above = box((0, -3, -2), (4, -0.2, 2), "+y"), box((0, 0, -2), (4, 3, 2), "-y")
