@@ -21,8 +21,7 @@ import numpy as np
 from scenes import TWO_ROOMS, model_file
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.file_order import leaf_of_cell
-from ptmtools.cells.rooms import grouped
+from ptmtools.cells.rooms import grouped, leaf_of_cell
 from ptmtools.portal_flow.double_double import Searched
 from ptmtools.scene import ingest
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs

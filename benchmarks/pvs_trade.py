@@ -167,7 +167,7 @@ def flow(folder: Path, method: Any) -> dict[str, float]:
     import numpy as np
     from memory import with_peak
 
-    from ptmtools.cells.file_order import leaf_of_cell
+    from ptmtools.cells.rooms import leaf_of_cell
     from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 
     compute_pvs(stored(folder, "small"), PvsOptions(method=method))

@@ -31,8 +31,7 @@ from scenes import MODELS, model_file
 from walk import at_hand, cell_texts, load, passed, standard_walk, texels_at_hand
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.file_order import leaf_of_cell
-from ptmtools.cells.rooms import grouped
+from ptmtools.cells.rooms import grouped, leaf_of_cell
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import Surfaces

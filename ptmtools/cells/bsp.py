@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -51,7 +51,7 @@ _NOWHERE = np.zeros((0, 3))  # no points
 _WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Tree:
     """A BSP tree over the root box, with every leaf, reachable or not."""
 
@@ -93,100 +93,103 @@ class _Task(NamedTuple):
     source: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class SplitPlanes:
+    """The planes that may split a box, in the order of their use; caps are those of the
+    ``structure``."""
+
+    ceiling: WallPlane | None  # splits first
+    walls: list[WallPlane]
+    reveals: Reveals
+    doors: DoorPlanes
+    structure: Structure
+
+
 def build_tree(
     box: Polyhedron,
-    structure: Structure,
-    walls: list[WallPlane],
-    reveals: Reveals,
-    doors: DoorPlanes,
+    planes: SplitPlanes,
     options: SubdivideOptions,
     progress: Progress,
-    ceiling: WallPlane | None = None,
     cost: Callable[[Tree], float] | None = None,
 ) -> Tree:
-    """Split ``box`` by the ``ceiling``, if there is one, by the planes of ``walls``, then of
-    ``reveals``, of ``doors`` and of the caps that are in the ``structure``; in the order that the
-    module describes. Splitting ends if the ``cost`` of the tree so far, 1 before the first split,
-    is lowered too little between `_FIRST_LOOK` and every `_LOOKS` times as many leaves."""
-    tolerance = structure.tolerance
-    least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0, 0.0)
-    taken: list[WallPlane] = []
-    children: list[list[int]] = []
-    leaves: list[Polyhedron] = []
-    queue: list[_Task] = []
-    unsplit, ended = 0, False
-    look, now = _FIRST_LOOK, 1.0
-    capped: dict[int, Polyhedron] = {}
-    hung: set[int] = set()
-
-    def hiding() -> frozenset[int]:
-        return frozenset(hung if options.doors in ("pass", "closed") else ())
-
-    def place(parent: tuple[int, int], child: int) -> None:
-        if parent[0] >= 0:
-            children[parent[0]][parent[1]] = child
-
-    def finish(body: Polyhedron, parent: tuple[int, int]) -> None:
-        place(parent, -2 - len(leaves))
-        leaves.append(body)
-
-    def push(
-        body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
-    ) -> None:
-        best = _best_split(body, fragments, least[source], taken, tolerance)
-        if best < 0 and source == _WALLS:
-            best = _best_split(body, fragments, least[source], taken, tolerance, sheets=True)
-        while best < 0 and source < _CAPS:
-            source += 1
-            if source == _REVEALS:
-                fragments = _sections(body, reveals.within(body, taken), tolerance)
-            elif source == _DOORS:
-                fragments = _sections(body, doors.within(body), tolerance)
-            else:
-                fragments = _sections(body, caps.closing(structure, body), tolerance, whole=True)
-            best = _best_split(body, fragments, least[source], taken, tolerance)
-        if best < 0:
-            finish(body, parent)
-            return
-        share = fragments[best].area / tolerance.extent**2
-        priority = (source > _REVEALS, -round(share / TIE_SHARE), len(taken), parent[1])
-        heapq.heappush(queue, _Task(priority, body, fragments, best, parent, source))
-
-    fragments = _sections(box, walls, tolerance)
-    above = _sections(box, [ceiling] if ceiling else [], tolerance)
-    if above:
-        first = (False, 0, 0, 0)
-        heapq.heappush(queue, _Task(first, box, [*above, *fragments], 0, (-1, 0), _WALLS))
-    else:
-        push(box, fragments, (-1, 0), _WALLS)
-    while queue:
-        if cost and len(leaves) + len(queue) >= look:
+    """Split ``box`` by planes, in the order that the module describes. Splitting ends if the
+    ``cost`` of the tree so far, 1 before the first split, is lowered too little between
+    `_FIRST_LOOK` and every `_LOOKS` times as many leaves."""
+    growth = _Growth(planes, options)
+    growth.plant(box)
+    look, present = _FIRST_LOOK, 1.0
+    while growth.queue:
+        if cost and growth.leaf_count >= look:
             look *= _LOOKS
-            slots = np.array(children, dtype=np.int32).reshape(-1, 2)
-            for k, task in enumerate(queue):
-                slots[task.parent] = -2 - len(leaves) - k
-            bodies = (*leaves, *(task.body for task in queue))
-            before, now = now, cost(Tree(tuple(taken), slots, bodies, hung=hiding()))
-            if now > (1 - options.gain) * before:
-                for task in queue:
-                    finish(task.body, task.parent)
-                ended = True
-                break
-        task = heapq.heappop(queue)
-        if len(leaves) + len(queue) + 2 > options.max_leaves:
-            finish(task.body, task.parent)
-            unsplit += task.source <= _REVEALS
-            continue
-        wall = task.fragments[task.best].wall
-        plane = wall.frame.plane
-        node = len(taken)
-        taken.append(wall)
-        children.append([OUTSIDE, OUTSIDE])
+            before, present = present, cost(growth.tree())
+            if present > (1 - options.gain) * before:
+                return replace(growth.tree(), ended=True)
+        growth.split_next()
+        progress(len(growth.leaves), growth.leaf_count, "splitting")
+    return growth.tree()
+
+
+class _Growth:
+    """A tree that is being split, and the nodes that wait for their split, the best first."""
+
+    def __init__(self, planes: SplitPlanes, options: SubdivideOptions) -> None:
+        self._planes, self._options = planes, options
+        self._tolerance = planes.structure.tolerance
+        self._least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0, 0.0)
+        self._walls: list[WallPlane] = []
+        self._children: list[list[int]] = []
+        self._unsplit = 0
+        self._capped: dict[int, Polyhedron] = {}
+        self._hung: set[int] = set()
+        self.leaves: list[Polyhedron] = []
+        self.queue: list[_Task] = []
+
+    @property
+    def leaf_count(self) -> int:
+        """The number of leaves if no waiting node is split."""
+        return len(self.leaves) + len(self.queue)
+
+    def tree(self) -> Tree:
+        """The tree so far; waiting nodes are leaves."""
+        children = np.array(self._children, dtype=np.int32).reshape(-1, 2)
+        for k, task in enumerate(self.queue):
+            if task.parent[0] >= 0:
+                children[task.parent] = -2 - len(self.leaves) - k
+        return Tree(
+            walls=tuple(self._walls),
+            children=children,
+            leaves=(*self.leaves, *(task.body for task in self.queue)),
+            unsplit=self._unsplit,
+            capped=dict(self._capped),
+            hung=frozenset(self._hung if self._options.doors in ("pass", "closed") else ()),
+        )
+
+    def plant(self, box: Polyhedron) -> None:
+        """Begins with the root."""
+        fragments = _sections(box, self._planes.walls, self._tolerance)
+        ceiling = [self._planes.ceiling] if self._planes.ceiling else []
+        if above := _sections(box, ceiling, self._tolerance):
+            first = (False, 0, 0, 0)
+            heapq.heappush(self.queue, _Task(first, box, [*above, *fragments], 0, (-1, 0), _WALLS))
+        else:
+            self._push(box, fragments, (-1, 0), _WALLS)
+
+    def split_next(self) -> None:
+        """Splits the first of the waiting nodes, unless that would exceed the limit on leaves."""
+        task = heapq.heappop(self.queue)
+        if self.leaf_count + 2 > self._options.max_leaves:
+            self._finish(task.body, task.parent)
+            self._unsplit += task.source <= _REVEALS
+            return
+        tolerance, wall = self._tolerance, task.fragments[task.best].wall
+        plane, node = wall.frame.plane, len(self._walls)
+        self._walls.append(wall)
+        self._children.append([OUTSIDE, OUTSIDE])
         if task.source > _REVEALS:
-            capped[node] = task.body
+            self._capped[node] = task.body
         if task.source == _DOORS:
-            hung.add(node)
-        place(task.parent, node)
+            self._hung.add(node)
+        self._place(task.parent, node)
         extents = _Extents(task.fragments)
         ahead = [extents.ahead(facing, tolerance) for facing in (plane, -plane)]
         cut_by = ahead[0] & ahead[1]
@@ -195,26 +198,54 @@ def build_tree(
                 raise AssertionError("a split that was accepted has two sides")
             # A part of a node that a door or a cap split may have further reveals and doors.
             if task.source > _REVEALS:
-                push(body, [], (node, side), _REVEALS)
+                self._push(body, [], (node, side), _REVEALS)
                 continue
             facing = plane if side == 0 else -plane
+            rows = [i for i in np.flatnonzero(ahead[side]).tolist() if i != task.best]
             inherited = [
                 f._replace(outline=clip_polygon(f.outline, facing, tolerance.rounding))
-                for i, f in enumerate(task.fragments)
-                if ahead[side][i] and i != task.best
+                for f in (task.fragments[i] for i in rows)
             ]
-            whole = [not cut_by[i] for i in np.flatnonzero(ahead[side]).tolist() if i != task.best]
-            push(body, _fragments(inherited, whole, tolerance), (node, side), task.source)
-        progress(len(leaves), len(leaves) + len(queue), "splitting")
-    return Tree(
-        tuple(taken),
-        np.array(children, dtype=np.int32).reshape(-1, 2),
-        tuple(leaves),
-        unsplit,
-        ended,
-        capped,
-        hiding(),
-    )
+            whole = [not cut_by[i] for i in rows]
+            self._push(body, _fragments(inherited, whole, tolerance), (node, side), task.source)
+
+    def _push(
+        self, body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
+    ) -> None:
+        """Lets a body wait with its best split, of the first source that has one; a leaf if none
+        has."""
+        walls, tolerance = self._walls, self._tolerance
+        best = _best_split(body, fragments, self._least[source], walls, tolerance)
+        if best < 0 and source == _WALLS:
+            best = _best_split(body, fragments, self._least[source], walls, tolerance, sheets=True)
+        while best < 0 and source < _CAPS:
+            source += 1
+            fragments = self._of_source(source, body)
+            best = _best_split(body, fragments, self._least[source], walls, tolerance)
+        if best < 0:
+            self._finish(body, parent)
+            return
+        share = fragments[best].area / tolerance.extent**2
+        priority = (source > _REVEALS, -round(share / TIE_SHARE), len(walls), parent[1])
+        heapq.heappush(self.queue, _Task(priority, body, fragments, best, parent, source))
+
+    def _of_source(self, source: int, body: Polyhedron) -> list[_Fragment]:
+        """The fragments inside a body of the planes of a source other than walls."""
+        planes, tolerance = self._planes, self._tolerance
+        if source == _REVEALS:
+            return _sections(body, planes.reveals.within(body, self._walls), tolerance)
+        if source == _DOORS:
+            return _sections(body, planes.doors.within(body), tolerance)
+        return _sections(body, caps.closing(planes.structure, body), tolerance, whole=True)
+
+    def _finish(self, body: Polyhedron, parent: tuple[int, int]) -> None:
+        self._place(parent, -2 - len(self.leaves))
+        self.leaves.append(body)
+
+    def _place(self, parent: tuple[int, int], child: int) -> None:
+        node, side = parent
+        if node >= 0:
+            self._children[node][side] = child
 
 
 def _sections(

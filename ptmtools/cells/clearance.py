@@ -12,8 +12,8 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.floors import PLAN
 from ptmtools.cells.planar import Geometry, buffer, difference, intersection, united_by
+from ptmtools.cells.planes import PLAN
 from ptmtools.cells.search import ByHeight
 from ptmtools.tolerance import Tolerance
 

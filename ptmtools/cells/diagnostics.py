@@ -13,7 +13,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.options import DoorState
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.roles import is_door_name, triangles_named
-from ptmtools.cells.unreached import Unreached, UnreachedRoom
+from ptmtools.cells.space import Unreached, UnreachedRoom
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.quantities import count

@@ -13,8 +13,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
+from ptmtools.arrays import Bools, Floats, Ints, normals, summed
 from ptmtools.cells.planar import bounded, count, divided, simplified
+from ptmtools.cells.planes import UPWARD, plane_axes
 from ptmtools.cells.search import distinct
 from ptmtools.tolerance import Tolerance, ranked
 
@@ -72,9 +73,6 @@ _STRAIGHT_SHARE = 1 / 32
 #: Regions of fewer triangles are left alone, and those of which less than this share is saved.
 _MANY = 16
 _SAVED = 3 / 4
-#: Normals of planes are turned to this side: no wall lies in the direction, so that rounding never
-#: decides.
-UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 
 
 @dataclass(frozen=True)
@@ -193,11 +191,3 @@ class Facets:
         count(["triangles"] * len(crossed))
         kept = ~np.isin(which, crossed)
         return space.reshape(-1, 3)[origin.reshape(-1, 3)[kept]], which[kept]
-
-
-def plane_axes(normal: Floats) -> tuple[Floats, Floats]:
-    """(r, 3) and (r, 3): directions square to each of (r, 3) unit normals and to one another."""
-    axis = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    u = cross(axis, normal)
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    return u, cross(normal, u)

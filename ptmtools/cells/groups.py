@@ -1,4 +1,18 @@
-"""Groups of leaves that grow along portals, the cheapest pair first."""
+"""Groups of leaves that grow along portals, the cheapest pair first, and what dividing a room into
+cells saves.
+
+A room is one cell, unless dividing it saves its viewers more than `SubdivideOptions.gain` of their
+download. With v the volume of a leaf (the frequency of viewers in it), w the area of the surfaces
+in it (their cost) and S the leaves that it sees (`sight`), a group G of leaves costs
+
+    apart     Σ v·w(S) + w·v(S)  over the leaves of G
+    together  v(G)·w(∪S) + w(G)·v(∪S)
+
+and the **gain** of dividing it is 1 - apart / together. Groups are joined in the order of the gain
+of dividing the two, as long as it is less than the threshold. Leaves without standing room come
+last: the pair that adds least to the cost of all groups is joined first, until half of the
+threshold has been added.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Ints
+from ptmtools.arrays import Bools, Floats, Ints
 
 #: Shares, and gains, are compared in this many significant digits: symmetrical buildings have many
 #: equal ones, which rounding must not order, not even that of a sliver far from the origin.
@@ -77,3 +91,116 @@ class Groups(ABC):
         while not np.array_equal(result, result[result]):
             result = result[result]
         return result
+
+
+#: Joining leaves without viewers may add this share of the threshold to the whole download.
+ATTACHED = 0.5
+
+
+def join_by_gain(
+    sees: Bools,
+    volume: Floats,
+    area: Floats,
+    pairs: NDArray[np.integer],
+    gain: float,
+    above: NDArray[np.integer] | None = None,
+) -> Ints:
+    """(L,) for each leaf the leaf that stands for its group.
+
+    Parameters
+    ----------
+    sees: (L, L) symmetric, visibility between leaves.
+    volume, area: (L,) of a leaf, m³ in which viewers are, and of the surfaces in it, m².
+    pairs: (n, 2) leaves through whose portals groups may grow.
+    gain: threshold, 0 to 1, of the gain of dividing a group.
+    above: (m, 2) leaves through whose portals only groups with viewers may grow.
+    """
+    every = np.stack([volume, area], axis=1)
+    more = pairs if above is None else np.concatenate([pairs, above])
+    parted = _Parted(sees.copy(), every.copy(), every, more)
+    group = parted.grown(lambda gained: gained < gain)
+    attached = _Attached(parted.sees, parted.own, every, group[pairs])
+    return attached.grown_by(ATTACHED * gain)[group]
+
+
+class _Costs(Groups):
+    """Groups and their costs."""
+
+    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
+        """``sees``: (L, L) which leaves a group sees; ``own``: (L, 2) its volume and area,
+        ``every``: those of the leaves. The first two change as groups grow, and a group that
+        has joined another has nothing."""
+        super().__init__(len(sees), pairs)
+        self.sees, self.own, self.every = sees, own, every
+        self.before = [cost(row, each, every) for row, each in zip(sees, own, strict=True)]
+
+    def together(self, a: int, b: int) -> float:
+        """The cost of two groups joined."""
+        return cost(self.sees[a] | self.sees[b], self.own[a] + self.own[b], self.every)
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self.sees[a] |= self.sees[b]
+        self.own[a] += self.own[b]
+        self.own[b] = 0.0
+        super().join(a, b)
+        return [(a, c) for c in self.near[a]]
+
+
+class _Parted(_Costs):
+    """Groups with viewers; the cost of a pair is the gain of dividing it."""
+
+    def cost(self, a: int, b: int) -> float:
+        if not (self.own[a][0] and self.own[b][0]):
+            return np.inf
+        together = self.together(a, b)
+        gain = 1 - (self.before[a] + self.before[b]) / together if together > 0 else 0.0
+        return round(gain, DIGITS)
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self.before[a] += self.before[b]  # of all its leaves apart
+        return super().join(a, b)
+
+
+class _Attached(_Costs):
+    """Pairs of groups, one without viewers; the cost is the share that joining adds to all
+    costs."""
+
+    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
+        super().__init__(sees, own, every, pairs)
+        self._all = sum(self.before)
+        self._added = 0.0
+
+    def grown_by(self, share: float) -> Ints:
+        """(L,) the groups, before joining has added ``share``; none is joined for 0."""
+        return self.grown(lambda added: self._added + added < share)
+
+    def cost(self, a: int, b: int) -> float:
+        if self.own[a][0] and self.own[b][0]:
+            return np.inf
+        added = self.together(a, b) - self.before[a] - self.before[b]
+        return round(added / self._all, 2 * DIGITS) if self._all else 0.0
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self._added += self.cost(a, b)
+        self.before[a] = self.together(a, b)
+        return super().join(a, b)
+
+
+def cost(seen: Bools, own: Floats, every: Floats) -> float:
+    """The cost of a group that sees leaves, (L,), and has a volume and an area, (2,); ``every``:
+    (L, 2) those of the leaves."""
+    volume, area = every[seen].sum(axis=0)
+    return float(own[0] * area + own[1] * volume)
+
+
+def gain_of(sees: Bools, every: Floats, group: Ints) -> float:
+    """The gain of dividing everything into groups, (L,), of leaves that see, (L, L), one another;
+    ``every``: (L, 2) their volumes and areas."""
+
+    def joined(members: Bools) -> float:
+        seen = np.asarray(sees[members].any(axis=0))
+        return cost(seen, every[members].sum(axis=0), every)
+
+    together = joined(np.ones(len(group), dtype=np.bool_))
+    apart = sum(joined(group == name) for name in np.unique(group))
+    return 1 - apart / together if together > 0 else 0.0

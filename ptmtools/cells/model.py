@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, fans, volumes
 from ptmtools.cells.options import WALKER, Walker
+from ptmtools.cells.planes import bounds
 from ptmtools.cells.search import Nearby, distinct
 from ptmtools.store.archive import Stored, texts, without_repeats
 from ptmtools.tolerance import Tolerance
@@ -60,7 +61,7 @@ class EyeRegion:
 
         inside = np.full(len(points), self.everywhere)
         if len(points) and not self.everywhere:
-            low, high = points.min(axis=0), points.max(axis=0)
+            low, high = bounds(points)
             floor = self._floor[self._nearby.meeting(low - [0, self._reach, 0], high)]
             order = np.argsort(points[:, 0], kind="stable")
             x, along = points[order, 0], floor[:, :, 0]

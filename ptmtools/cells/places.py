@@ -31,7 +31,7 @@ from ptmtools.cells.clearance import (
     shadows,
     tiled,
 )
-from ptmtools.cells.floors import PLAN, Floors
+from ptmtools.cells.floors import Floors
 from ptmtools.cells.options import Walker
 from ptmtools.cells.planar import (
     Geometry,
@@ -43,6 +43,7 @@ from ptmtools.cells.planar import (
     straightened,
     united_by,
 )
+from ptmtools.cells.planes import PLAN, boxes_meet
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.search import along_a_curve
 from ptmtools.executor import Executor
@@ -99,17 +100,6 @@ class Places:
         plan, slope = np.concatenate(corners), self.slope[np.concatenate(of)]
         height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
         return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
-
-
-def boxes_meet(low: Floats, high: Floats, boxes: Floats) -> Bools:
-    """(n,) which of the boxes between (n, 3) corners meet one of (m, 2, 3) boxes."""
-    x0, z0 = low[:, PLAN].T
-    x1, z1 = high[:, PLAN].T
-    (u0, least, w0), (u1, most, w1) = boxes.transpose(1, 2, 0)
-    row, one = shapely.STRtree(shapely.box(x0, z0, x1, z1)).query(shapely.box(u0, w0, u1, w1))
-    result = np.zeros(len(low), dtype=np.bool_)
-    result[one[(low[one, 1] <= most[row]) & (high[one, 1] >= least[row])]] = True
-    return result
 
 
 def find_places(

@@ -168,9 +168,3 @@ def _compact(points: Floats, faces: list[tuple[list[int], int]]) -> Polyhedron:
         tuple(np.array([rename[i] for i in loop]) for loop, _ in faces),
         tuple(tag for _, tag in faces),
     )
-
-
-def bounds(corners: Floats) -> tuple[Floats, Floats]:
-    """(3,) and (3,): the least and the greatest coordinates of points, (…, 3)."""
-    points = corners.reshape(-1, 3)
-    return points.min(axis=0), points.max(axis=0)

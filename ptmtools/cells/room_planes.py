@@ -23,10 +23,11 @@ from ptmtools.arrays import Bools, Floats, Ints, areas, normals
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, buffer, intersection, unite
+from ptmtools.cells.planes import Frame, bounds
 from ptmtools.cells.polyhedron import Polyhedron, cut, section
 from ptmtools.cells.portals import Portal, find_portals
 from ptmtools.cells.room_volumes import Volume
-from ptmtools.cells.structure import Frame, Structure, WallPlane
+from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
 #: Contacts are compared by the share of the leaf's section that they cover, in this many digits.
@@ -115,7 +116,7 @@ def _contact(
     if not shapely.area(shape) >= (1 - TIE_SHARE) * least:
         return None
     points = frame.to_space(shapely.get_coordinates(shape))
-    return Contact(frame, shape, points.min(axis=0), points.max(axis=0))
+    return Contact(frame, shape, *bounds(points))
 
 
 def split_at(
@@ -137,7 +138,7 @@ def split_at(
     while waiting and len(leaves) < options.max_leaves:
         leaf = waiting.pop()
         body = leaves[leaf]
-        low, high = body.points.min(axis=0), body.points.max(axis=0)
+        low, high = bounds(body.points)
         near = ((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)
         around = [contacts[k] for k in np.flatnonzero(near).tolist()]
         contact = _best(around, body, options, tolerance)

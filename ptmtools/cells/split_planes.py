@@ -22,11 +22,11 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.facets import plane_axes
 from ptmtools.cells.planar import Geometry, left_open
+from ptmtools.cells.planes import Frame, bounds, parallel_gap, plane_axes
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron, section
 from ptmtools.cells.search import Tries
-from ptmtools.cells.structure import Frame, Structure, WallPlane, parallel_gap
+from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.tolerance import TIE_SHARE, ranked
 
 
@@ -150,7 +150,7 @@ class DoorPlanes:
     def within(self, body: Polyhedron) -> list[WallPlane]:
         """The planes whose boxes meet that of a body, with what blocks there: all that lies in the
         plane of a leaf may be hundreds of leaves."""
-        low, high = body.points.min(axis=0), body.points.max(axis=0)
+        low, high = bounds(body.points)
         meets = np.flatnonzero(((self.low <= high) & (self.high >= low)).all(axis=1))
         near = self.structure.nearby.meeting(low, high) if len(meets) else meets
         result = []
@@ -183,7 +183,7 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     """The planes whose polygons leave no opening between two parts of a body, in the order of the
     model's triangles: many are equally good, and areas of strips some centimetres wide keep few
     digits far from the origin."""
-    low, high = body.points.min(axis=0), body.points.max(axis=0)
+    low, high = bounds(body.points)
     near = structure.nearby.meeting(low, high)
     slack, corners = structure.tolerance.plane, structure.corners[near]
     apart = (corners.min(axis=1) > high + slack) | (corners.max(axis=1) < low - slack)

@@ -21,45 +21,16 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
-from ptmtools.cells.facets import UPWARD, Facets, Welded
+from ptmtools.arrays import Bools, Floats, Ints, normals, summed
+from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
+from ptmtools.cells.planes import Frame, planes_of
 from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import Bins, Nearby, Tries, connected
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A plane with two axes in it: `to_plane` and `to_space` are inverses up to rounding."""
-
-    plane: Floats  # (4,) unit normal n and offset d, n·x + d = 0
-    origin: Floats  # a point of it
-    u: Floats  # an orthonormal basis, u × v = n
-    v: Floats
-
-    @staticmethod
-    def of(plane: Floats) -> Frame:
-        """A frame for a (4,) plane; the axes depend on nothing but the plane."""
-        normal = plane[:3]
-        axis = np.zeros(3)
-        axis[np.argmin(np.abs(normal))] = 1.0
-        u = cross(axis, normal)
-        u /= np.linalg.norm(u)
-        return Frame(plane, -plane[3] * normal, u, cross(normal, u))
-
-    def to_plane(self, points: Floats) -> Floats:
-        """(…, 2) coordinates of (…, 3) points, projected along the normal."""
-        q = points - self.origin
-        return np.stack([q @ self.u, q @ self.v], axis=-1)
-
-    def to_space(self, flat: Floats) -> Floats:
-        """(…, 3) points of (…, 2) coordinates."""
-        space: Floats = self.origin + flat[..., :1] * self.u + flat[..., 1:] * self.v
-        return space
 
 
 @dataclass(frozen=True)
@@ -73,7 +44,7 @@ class WallPlane:
     barring: Geometry | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Structure:
     """The triangles that may bound a leaf, as few as possible, with indices for searches."""
 
@@ -220,17 +191,6 @@ def built(walls: list[WallPlane]) -> list[WallPlane]:
     return [wall for wall, keeps in zip(walls, straight, strict=True) if keeps]
 
 
-def planes_of(corners: Floats) -> tuple[Floats, Floats]:
-    """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
-    normal = normals(corners)
-    double = np.linalg.norm(normal, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)
-    normal *= np.where(normal @ UPWARD < 0, -1.0, 1.0)[:, None]
-    offset = -np.einsum("ij,ij->i", normal, corners.mean(axis=1))
-    return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
-
-
 def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
@@ -267,14 +227,6 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
         else:
             tries.fail(seed, near[free[near]], wall_area)
     return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
-
-
-def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
-    """Distance of two parallel (4,) planes in metres, whichever way they face; else infinite."""
-    turn = float(plane[:3] @ other[:3])
-    if abs(turn) < tolerance.cosine:
-        return float("inf")
-    return abs(float(plane[3]) - float(np.sign(turn)) * float(other[3]))
 
 
 #: Number of triangles in a plane from which all of them count as one cluster.

@@ -2,7 +2,7 @@
 
 1. Walls propose planes (`structure`), which split the root box into convex leaves (`bsp`); the
    parts of the leaves' boundaries that no wall covers are portals (`portals`).
-2. A flood through the portals finds the reachable leaves (`division`). If it meets the first root
+2. A flood through the portals finds the reachable leaves (`space`). If it meets the first root
    box, which is wider than the model, the model is open, and its bounding box is divided instead.
 3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
 4. Leaves that no standing viewer sees are left out (`sight`), the others grouped (`rooms`).
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.cells.building import Building
-from ptmtools.cells.ceilings import ROOFED, roofed_share
 from ptmtools.cells.diagnostics import (
     NO_PLACES,
     detail_notes,
@@ -32,18 +31,20 @@ from ptmtools.cells.diagnostics import (
     unrecognised_door_notes,
     viewpoint_notes,
 )
-from ptmtools.cells.division import Space, divide, divide_inside
 from ptmtools.cells.doors import THICK
+from ptmtools.cells.floors import ROOFED, roofed_share
 from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
-from ptmtools.cells.places import boxes_meet, eye_region, meets
+from ptmtools.cells.places import eye_region, meets
 from ptmtools.cells.planar import count, counting
-from ptmtools.cells.polyhedron import Polyhedron, bounds
+from ptmtools.cells.planes import bounds, boxes_meet
+from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.roles import matches
 from ptmtools.cells.rooms import grouped
 from ptmtools.cells.sight import seen_from_places
+from ptmtools.cells.space import Space, divide, divide_inside
 from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError

@@ -25,7 +25,7 @@ from ptmtools.store.copies import url_of
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
 if TYPE_CHECKING:
-    from ptmtools.cells.open_doors import Enclosure
+    from ptmtools.cells.doors import Enclosure
     from ptmtools.scene.inspection import Guess, Inspection
     from ptmtools.scene.model import Scene
 
@@ -203,7 +203,7 @@ def _described(description: Description) -> dict[str, Any]:
 
 def _info_model(console: Console, target: str, options: IngestOptions) -> None:
     """Raises what `ptmtools.scene.ingest` raises."""
-    from ptmtools.cells.open_doors import enclosure
+    from ptmtools.cells.doors import enclosure
     from ptmtools.parallel import processors
     from ptmtools.scene.inspection import inspect
     from ptmtools.store.remote import model_file

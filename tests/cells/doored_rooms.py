@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ptmtools.cells import Cells, SubdivideOptions
-from ptmtools.cells.open_doors import Doors
+from ptmtools.cells.doors import Doors
 from ptmtools.cells.search import connected
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.scene.model import Scene

@@ -13,7 +13,6 @@ import shapely
 
 from ptmtools.cells import planar, subdivision
 from ptmtools.cells.diagnostics import undecided_notes
-from ptmtools.cells.division import Space, divide
 from ptmtools.cells.planar import (
     bounded,
     buffer,
@@ -29,6 +28,7 @@ from ptmtools.cells.planar import (
     unite,
     united_by,
 )
+from ptmtools.cells.space import Space, divide
 from ptmtools.cells.subdivision import subdivide
 from ptmtools.tolerance import Tolerance
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.cells import Cells, SubdivideOptions, file_order, subdivide
-from ptmtools.cells.gain import join_by_gain
+from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells.groups import join_by_gain
+from ptmtools.cells.rooms import _in_order
 from ptmtools.cells.sight import _even, _lines, portals_of, sampled_sight
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
@@ -242,5 +243,5 @@ def test_leaves_are_put_in_order_as_their_lists_of_shares_are() -> None:
             [(s, -held[i, s]) for s in np.flatnonzero(held[i])] + [(99, 0.0)] for i in range(leaves)
         ]
         order = sorted(range(leaves), key=lists.__getitem__)
-        rank = file_order._in_order(leaf, source, held[leaf, source], leaves)
+        rank = _in_order(leaf, source, held[leaf, source], leaves)
         assert np.argsort(rank).tolist() == order

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.gain import join_by_gain
+from ptmtools.cells.groups import join_by_gain
 from ptmtools.cells.model import EyeRegion
 from ptmtools.cells.options import WALKER
 from ptmtools.coverage.placement import Volume
