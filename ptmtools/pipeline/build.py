@@ -20,6 +20,7 @@ from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
 from ptmtools.pipeline.stage import Options, Run, Stage
 from ptmtools.pipeline.stages import EMIT, SCENE, STAGES
 from ptmtools.progress import Progress, silent
+from ptmtools.store.layout import MANIFEST
 from ptmtools.store.remote import folder_to_build, model_file
 from ptmtools.store.writer import DatabaseWriter
 
@@ -130,6 +131,10 @@ def _run(
     start: float,
     tell: Tell,
 ) -> BuildReport:
+    done = run.db.manifest.stages
+    run.writer.provisional = all(STAGES[name].joined for name in done if name in STAGES) and (
+        bool(done) or not (run.db.path / MANIFEST).exists()
+    )
     jobs = [stage.job(run, stage, options[stage]) for stage in stages]
     shown = run.progress
 

@@ -88,8 +88,8 @@ class Stage(Generic[A]):
         lack its record.
     telling: whether a run of an optional stage that wrote nothing is reported all the same, from
         its counts.
-    joined: it has no command of its own, and its outputs are committed with those of the next
-        stage: a model that cannot be cut into cells leaves no database behind.
+    joined: it has no command of its own, and its outputs belong to those of the next stage: a model
+        that cannot be cut into cells leaves no database behind, and changes none.
     from_model: its command takes a model, and runs the stages before it too.
     one_thread: it leaves the other processors to later stages that can begin.
     """
@@ -431,16 +431,18 @@ class Run(Artifacts):
         seconds: float,
         tasks: tuple[int, int, int] | None = None,
     ) -> None:
-        """Ends the turn of a stage: commits, unless it is `Stage.joined` to the next, and reports.
+        """Ends the turn of a stage: commits, unless it is `Stage.joined` to the next in a database
+        that has more than such stages, and reports.
 
         An optional stage that has written nothing, and had not, is not reported, unless its counts
         are `Stage.telling`.
         """
         record = self.record(stage)
         committed = self.db.manifest.stages.get(stage.name)
-        if self._joint and not stage.joined:
+        if self._joint and (not stage.joined or self.writer.provisional):
             self._joint.commit(self._uncommitted)
             self._joint, self._uncommitted = None, {}
+            self.writer.provisional &= stage.joined
         idle = not record.outputs and not record.notes and not (committed and committed.outputs)
         if not (stage.optional and idle) or stage.telling(record.counts):
             notes, warnings = tuple(record.notes), tuple(record.warnings)

@@ -14,7 +14,7 @@ from ptmtools.store.folder import DatabaseFolder, last_manifest, read_manifest
 from ptmtools.store.layout import LOCK, MANIFEST, STAGING
 from ptmtools.store.lock import acquire
 from ptmtools.store.manifest import Manifest
-from ptmtools.store.transaction import Transaction, discard, recover
+from ptmtools.store.transaction import Transaction, discard, recover, remove_former
 
 
 class DatabaseWriter(DatabaseFolder):
@@ -35,6 +35,8 @@ class DatabaseWriter(DatabaseFolder):
         """``manifest`` is called with the lock held; ``created`` are the folders created for the
         database, outermost first; ``thoroughly`` is for `without_lost`."""
         self._release, self._created, self._turn = acquire(path), created, Lock()
+        #: Whether the database has only what a model that cannot be built must not leave behind.
+        self.provisional = False
         try:
             recover(path)
             super().__init__(path, manifest())
@@ -90,9 +92,13 @@ class DatabaseWriter(DatabaseFolder):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        committed = (self.path / MANIFEST).exists()
         # A model that cannot be built leaves nothing behind.
         hopeless = kind is not None and issubclass(kind, InputError)
+        with suppress(OSError):
+            if hopeless and self.provisional and (self.path / MANIFEST).exists():
+                remove_former(self.path, self.manifest, Manifest(self.manifest.model))
+                (self.path / MANIFEST).unlink()
+        committed = (self.path / MANIFEST).exists()
         with suppress(OSError):
             discard(self.path, also_finished=kind is None or (not committed and hopeless))
         self.digests.save()
