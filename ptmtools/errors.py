@@ -20,6 +20,19 @@ status    meaning
 130       interrupted
 141       the reader of the output has ended
 ========  ======================================================================
+
+The tree; each class has the letter of its codes and its exit status::
+
+    PtmError
+    ├── InputError              I  3
+    │   └── LimitError          L  7
+    ├── OutputError             O  4
+    ├── DatabaseError           D  5
+    ├── MissingComponentError   M  6
+    ├── CheckError              C  8
+    └── WorkerError             W  9
+
+Findings of ``ptm validate`` (D), notes (N) and internal errors (X) are codes, not classes.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def all_codes() -> set[str]:
     """Codes that the program can give."""
     return {
         f"PTM-{letter}{number}"
-        for file in (*ROOT.glob("ptmtools/**/*.py"), *ROOT.glob("web/**/*.js"))
+        for file in (*ROOT.glob("ptmtools*/**/*.py"), *ROOT.glob("web/**/*.js"))
         for letter, number in FIRST.findall(file.read_text("utf-8"))
     }
 

@@ -47,3 +47,14 @@ def test_commands_and_requirements(recipe: dict[str, Any]) -> None:
     assert {*recipe["requirements"]["run"]} == {python, *conda(everywhere)}
     build = conda(PROJECT["build-system"]["requires"])
     assert {*recipe["requirements"]["host"]} == {python, "pip", *build}
+
+
+def test_the_citation_has_the_version_and_the_licence() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == __version__
+    assert citation["license"] == "MIT"
+    assert citation["cff-version"] == "1.2.0"
+    assert [name["family-names"] for name in citation["references"][0]["authors"]] == [
+        "Marvie",
+        "Bouatouch",
+    ]

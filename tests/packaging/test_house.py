@@ -226,7 +226,7 @@ def test_a_parameter_is_followed(checkout: Path) -> None:
 
 def test_a_checkout_with_other_folders_is_measured(checkout: Path) -> None:
     (checkout / "sample_data/ptmtools_samples/__init__.py").unlink()
-    write(checkout, "docs/guide.md", "three short words\n")
+    write(checkout, "docs/index.md", "three short words\n")
     write(checkout, "tests/test_a.py", "def test(): ...\n")
     figures = measure(checkout)
     assert figures["words of docs"] == "3 in 1 pages"
