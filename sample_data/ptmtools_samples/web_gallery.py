@@ -46,7 +46,7 @@ REPEAT, CLAMP, LINEAR, MIPMAPS = 10497, 33071, 9729, 9987
 
 
 @dataclass(frozen=True)
-class DracoMesh:
+class WebMesh:
     """Triangles in one material: (P, 3) points, (P, 2) texture coordinates, v down, (T, 3)."""
 
     material: str
@@ -55,7 +55,7 @@ class DracoMesh:
     triangles: NDArray[np.uint32]
 
 
-def meshes_of(faces: Sequence[Face]) -> list[DracoMesh]:
+def meshes_of(faces: Sequence[Face]) -> list[WebMesh]:
     """A mesh for each material, with shared vertices."""
     corners: dict[str, list[tuple[float, ...]]] = defaultdict(list)
     for face in faces:
@@ -66,11 +66,11 @@ def meshes_of(faces: Sequence[Face]) -> list[DracoMesh]:
     for material, vertex_rows in corners.items():
         vertices, index = np.unique(np.array(vertex_rows, np.float32), axis=0, return_inverse=True)
         triangles = index.reshape(-1, 3).astype(np.uint32)
-        meshes.append(DracoMesh(material, vertices[:, :3], vertices[:, 3:], triangles))
+        meshes.append(WebMesh(material, vertices[:, :3], vertices[:, 3:], triangles))
     return meshes
 
 
-def statues_of(things: Sequence[Thing], options: WebGalleryOptions) -> list[DracoMesh]:
+def statues_of(things: Sequence[Thing], options: WebGalleryOptions) -> list[WebMesh]:
     """Scanned-looking statues in the places of simple ones, in the same bounds; marble, whose image
     repeats every 0.8 m along x and y."""
     meshes = []
@@ -85,7 +85,7 @@ def statues_of(things: Sequence[Thing], options: WebGalleryOptions) -> list[Drac
         statue_foot = (least + greatest) / 2 * [1, 0, 1] + least * [0, 1, 0]
         points = ((made.points - statue_foot) * scale + foot).astype(np.float32)
         uv = np.round(points[:, :2] / np.float32(0.8), 4)
-        meshes.append(DracoMesh("marble", points, uv, made.triangles.astype(np.uint32)))
+        meshes.append(WebMesh("marble", points, uv, made.triangles.astype(np.uint32)))
     return meshes
 
 
@@ -127,7 +127,7 @@ class _Buffer:
 
 
 def _primitive(
-    mesh: DracoMesh, low: NDArray[np.float64], extent: float, buffer: _Buffer, accessors: list[Any]
+    mesh: WebMesh, low: NDArray[np.float64], extent: float, buffer: _Buffer, accessors: list[Any]
 ) -> dict[str, Any]:
     import DracoPy
 
@@ -169,7 +169,7 @@ def _primitive(
     }
 
 
-def glb_of(meshes: Sequence[DracoMesh], images: dict[str, bytes], about: str) -> bytes:
+def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> bytes:
     """A GLB with a node for each mesh; ``images`` by the name of the material, or of the texture
     that it uses (`ptmtools_samples.museum.MATERIALS`)."""
     buffer = _Buffer()
