@@ -31,7 +31,16 @@ LINK = re.compile(r"\]\(([^()\s]+)\)")
 #: A page or a picture that a file of the code names.
 NAMED_PAGE = re.compile(r"\b(docs/[\w/-]+\.(?:md|png|jpg))(#[\w-]+)?")
 #: A file or a folder of the project.
-TOPS = "ptmtools", "web", "tests", "benchmarks", "release", "sample_data"
+TOPS = (
+    "ptmtools",
+    "ptmtools_lab",
+    "ptmtools_systems",
+    "web",
+    "tests",
+    "benchmarks",
+    "release",
+    "sample_data",
+)
 NAMED_FILE = re.compile(rf"(?<![\w/.])((?:{'|'.join(TOPS)})/[\w./-]*[\w/])")
 SOURCES = {".py", ".js", ".mjs", ".c", ".h", ".json", ".md"}
 #: Code in a line, and a line of code.
@@ -142,7 +151,7 @@ def test_files_that_the_pages_name_exist() -> None:
 
 def options_of_scripts() -> set[str]:
     """The options of everything that is no `ptm` command: benchmarks and sample data."""
-    scripts = [*ROOT.glob("benchmarks/**/*.py"), *ROOT.glob("sample_data/*.py")]
+    scripts = [*ROOT.glob("benchmarks/**/*.py"), *ROOT.glob("sample_data/**/*.py")]
     return {o for s in scripts for o in re.findall(r'"(--[a-z-]+)"', s.read_text("utf-8"))}
 
 
@@ -202,7 +211,7 @@ def test_messages_are_those_of_the_program() -> None:
     """Runs of six words or more, in the notes and errors that pages show, stand in the source."""
     printed = "\n".join(
         node.value
-        for file in (ROOT / "ptmtools").rglob("*.py")
+        for file in ROOT.glob("ptmtools*/**/*.py")
         for node in ast.walk(ast.parse(file.read_text("utf-8")))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     )

@@ -142,7 +142,7 @@ PATTERN = re.compile(
 
 
 def test_calls_of_one_system_have_an_alternative() -> None:
-    for file in (ROOT / "ptmtools").rglob("*.py"):
+    for file in ROOT.glob("ptmtools*/**/*.py"):
         text = file.read_text(encoding="utf-8")
         guards = GUARDED.get(file.relative_to(ROOT).as_posix(), {})
         for call in {match.group() for match in PATTERN.finditer(text)}:

@@ -107,7 +107,11 @@ def test_the_wheel_is_small_and_holds_the_page_the_decoder_and_the_schemas(wheel
         for file in (ROOT / "ptmtools" / folder).glob(pattern):
             assert f"ptmtools/{file.relative_to(ROOT / 'ptmtools').as_posix()}" in names
     assert "ptmtools/site/page/decoder.wasm" in names
-    foreign = {name for name in names if not re.match(r"ptmtools[/-]", name)}
+    others = {f"ptmtools_{name}/py.typed" for name in ("lab", "systems", "samples")}
+    assert others <= names
+    foreign = {
+        name for name in names if not re.match(r"ptmtools(_lab|_systems|_samples)?[/-]", name)
+    }
     assert not foreign
     assert any(name.endswith(".data/data/share/man/man1/ptm.1") for name in names)
 
