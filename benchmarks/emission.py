@@ -32,7 +32,7 @@ from scenes import MODELS, MUSEUM, model_file
 from ptmtools import AchOptions, compute_ach
 from ptmtools.cells import Cells, subdivide
 from ptmtools.coverage.model import Ach
-from ptmtools.output import EmitOptions, TextureRecord, emit
+from ptmtools.output import EmitExtras, EmitOptions, TextureRecord, emit
 from ptmtools.output.content import Content
 from ptmtools.output.emission import compressed
 from ptmtools.output.geometry import Geometry
@@ -148,8 +148,9 @@ def heading(name: str) -> None:
 def emitted(scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, folder: Path) -> Written:
     """The VRML files and the hints, as they are on the disk."""
     some, out, options = records(scene), folder / "www", EmitOptions(format="vrml")
-    seconds = best(lambda: emit(scene, cells, pvs, ach, some, out, options, force=True))
-    report = emit(scene, cells, pvs, ach, some, out, options, force=True)
+    extras = EmitExtras(force=True)
+    seconds = best(lambda: emit(scene, cells, pvs, ach, some, out, options, extras))
+    report = emit(scene, cells, pvs, ach, some, out, options, extras)
     return Written(report.triangles, [(out / name).read_bytes() for name in report.files], seconds)
 
 

@@ -49,7 +49,7 @@ from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
-from ptmtools.output import TextureRecord, emit
+from ptmtools.output import EmitExtras, TextureRecord, emit
 from ptmtools.parallel import Workers
 from ptmtools.scene import Scene, SourceImage, ingest
 from ptmtools.store.archive import pack_arrays, unpack_arrays
@@ -127,7 +127,8 @@ class Work:
             for i, image in enumerate(scene.images)
         )
         out = self.folder / "www"
-        return lambda: emit(scene, cells, pvs, ach, textures, out, force=True, workers=self.jobs)
+        extras = EmitExtras(force=True, workers=self.jobs)
+        return lambda: emit(scene, cells, pvs, ach, textures, out, extras=extras)
 
     def _images(self) -> list[SourceImage]:
         """Their names; nothing here asks for their bytes."""

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         WorkerError as WorkerError,
     )
     from ptmtools.output import (
+        EmitExtras as EmitExtras,
         EmitOptions as EmitOptions,
         PlotOptions as PlotOptions,
         emit as emit,
@@ -99,7 +100,7 @@ __getattr__ = lazy_exports(
             "CheckError DatabaseError InputError LimitError MissingComponentError OutputError "
             "PtmError WorkerError"
         ),
-        "ptmtools.output": "EmitOptions PlotOptions emit plot_plan",
+        "ptmtools.output": "EmitExtras EmitOptions PlotOptions emit plot_plan",
         "ptmtools.output.served": "Served read_served",
         "ptmtools.pipeline.build": "build_scene run_stage",
         "ptmtools.pipeline.encoding": "TextureOptions",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from ptmtools.output.content import EmitExtras as EmitExtras
     from ptmtools.output.emission import emit as emit
     from ptmtools.output.model import (
         EmitReport as EmitReport,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __getattr__ = lazy_exports(
     __name__,
     {
+        "ptmtools.output.content": "EmitExtras",
         "ptmtools.output.emission": "emit",
         "ptmtools.output.model": (
             "EmitReport GivenViewpoint PlotOptions PlotReport TextureRecord Viewpoint"

@@ -1,8 +1,8 @@
-"""The input of all emitters: artifacts, textures, viewpoints, and what is derived from them."""
+"""The input of all emitters: artifacts, textures, viewpoints, and the values derived from them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from ptmtools.output.emitter import Emitter
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions
 from ptmtools.output.numbers import shares_of
-from ptmtools.output.representation import Represented
+from ptmtools.output.representation import Represented, object_maps, replaced_objects
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -25,7 +25,52 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
     from ptmtools.output.mesh_levels import MeshLevels
-    from ptmtools.output.object_maps import ObjectMaps
+
+
+@dataclass(frozen=True)
+class EmitExtras:
+    """Results of stages that a database may lack, and how `emit` runs.
+
+    Attributes
+    ----------
+    light: the light of the cells, if baked.
+    represented: other representations of objects, whose files are already written, one for each
+        kind.
+    need: the levels of the images' textures that each cell requires; None leaves them out.
+    map_need: likewise of the normal maps of objects.
+    force: overwrite files of the same names, gzip copies included.
+    progress: called for every cell.
+    workers: threads that may be used.
+    """
+
+    light: Light | None = None
+    represented: tuple[Represented, ...] = ()
+    need: Need | None = None
+    map_need: Need | None = None
+    force: bool = False
+    progress: Progress = silent
+    workers: int = 1
+
+
+#: The place of a texture in the hints, and its record.
+Place = tuple[int, TextureRecord]
+
+
+class TexturePlaces:
+    """The places of textures in the hints.
+
+    Attributes
+    ----------
+    of_image: by the image of the scene.
+    of_cell: of the lightmap of each cell.
+    of_object: of the normal map of each object.
+    """
+
+    def __init__(self, textures: Sequence[TextureRecord]) -> None:
+        placed = list(enumerate(textures))
+        self.of_image: dict[int, Place] = {r.image: (i, r) for i, r in placed if r.image >= 0}
+        self.of_cell: dict[int, Place] = {r.cell: (i, r) for i, r in placed if r.cell >= 0}
+        self.of_object: dict[int, Place] = {r.object: (i, r) for i, r in placed if r.object >= 0}
 
 
 @dataclass(frozen=True)
@@ -36,13 +81,7 @@ class Content:
     textures: in the order of the hints; one for every image that a material in use names, and then
         the lightmaps of cells, and the normal maps of objects.
     viewpoints: where a walk may start.
-    progress: called for every cell.
-    need: the required levels of textures, if measured.
-    represented: other representations of objects, one for each kind.
-    workers: number of threads.
     emitters: the forms that are written, in the order of writing.
-    light: the light of the cells, if baked.
-    map_need: the required levels of the normal maps of objects, if measured.
     """
 
     scene: Scene
@@ -50,15 +89,10 @@ class Content:
     pvs: Pvs
     ach: Ach
     textures: tuple[TextureRecord, ...]
-    viewpoints: tuple[Viewpoint, ...] = ()
     options: WriterOptions = WriterOptions()  # noqa: RUF009 - a frozen value
-    progress: Progress = silent
-    need: Need | None = None
-    represented: tuple[Represented, ...] = ()
-    workers: int = 1
+    extras: EmitExtras = EmitExtras()
+    viewpoints: tuple[Viewpoint, ...] = ()
     emitters: tuple[Emitter, ...] = ()
-    light: Light | None = None
-    map_need: Need | None = None
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -68,8 +102,9 @@ class Content:
     @cached_property
     def lit(self) -> Geometry:
         """`geometry` with the light, and the coordinates in normal maps of objects."""
-        lit = self.geometry.lit_by(self.light) if self.light else self.geometry
-        return lit.mapped_by(self.object_maps, self.scene, self.cells) if self.object_maps else lit
+        light, maps = self.extras.light, object_maps(self.extras.represented)
+        lit = self.geometry.lit_by(light) if light else self.geometry
+        return lit.mapped_by(maps, self.scene, self.cells) if maps else lit
 
     @cached_property
     def position_exponent(self) -> int:
@@ -83,9 +118,10 @@ class Content:
         """The levels of objects with many triangles, by cell and object."""
         from ptmtools.output.mesh_levels import mesh_levels
 
-        if self.options.lods != "auto" or not any(one.has_meshes for one in self.emitters):
+        if self.options.lods != "auto" or not any(form.has_meshes for form in self.emitters):
             return ()
-        return mesh_levels(self.lit, self.replaced, self.progress)
+        replaced = replaced_objects(self.extras.represented)
+        return mesh_levels(self.lit, replaced, self.extras.progress)
 
     @cached_property
     def mesh_of(self) -> Mapping[tuple[int, int], int]:
@@ -100,66 +136,33 @@ class Content:
         return [leaves.tolist() for leaves in np.split(order, first)[1:]]
 
     @cached_property
-    def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
-        """Image of the scene → its index in `textures`, and its record."""
-        return {r.image: (place, r) for place, r in enumerate(self.textures) if r.image >= 0}
-
-    @cached_property
-    def lightmap_of(self) -> Mapping[int, tuple[int, TextureRecord]]:
-        """Cell → the index of its lightmap in `textures`, and the record of that."""
-        return {r.cell: (place, r) for place, r in enumerate(self.textures) if r.cell >= 0}
-
-    @cached_property
-    def object_maps(self) -> ObjectMaps | None:
-        """The places of objects in their normal maps, if there are any."""
-        return next((r.maps for r in self.represented if r.maps), None)
-
-    @cached_property
-    def map_of(self) -> Mapping[int, tuple[int, TextureRecord]]:
-        """Object → the index of its normal map in `textures`, and the record of that."""
-        return {r.object: (place, r) for place, r in enumerate(self.textures) if r.object >= 0}
-
-    @cached_property
-    def replaced(self) -> frozenset[int]:
-        """The objects of the scene with another representation."""
-        return frozenset(number for kind in self.represented for number in kind.objects)
-
-    @cached_property
-    def extras(self) -> Mapping[int, Mapping[str, int]]:
-        """Object of the scene → the members of its nodes' "extras": of each kind of representation
-        the number of its row."""
-        extras: dict[int, dict[str, int]] = {}
-        for represented in self.represented:
-            if represented.kind:
-                for row, number in enumerate(represented.objects):
-                    extras.setdefault(number, {})[represented.kind.member] = row
-        return extras
-
-    @cached_property
-    def normal_maps(self) -> frozenset[int]:
-        """The images of the scene that are normal maps of materials, and nothing else."""
-        maps = {m.normal.image for m in self.scene.materials if m.normal}
-        return frozenset(maps - {m.image for m in self.scene.materials})
+    def places(self) -> TexturePlaces:
+        """Where the hints list the textures."""
+        return TexturePlaces(self.textures)
 
     @cached_property
     def paint(self) -> NDArray[np.int64]:
         """(S,) the index of each shape's texture in `textures`; -1 for none."""
-        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
+        of_image, materials = self.places.of_image, self.scene.materials
+        place = [of_image[m.image][0] if m.image >= 0 else -1 for m in materials]
         paint: NDArray[np.int64] = np.array(place, dtype=np.int64)[self.geometry.material]
         return paint
 
     @cached_property
     def painted(self) -> list[NDArray[np.int64]]:
         """For each cell the indices of its textures in `textures`, ascending."""
-        start = self.geometry.cell_start[1:-1]
-        cells = np.split(self.paint, start)
-        light = [self.lightmap_of[c][0] if c in self.lightmap_of else -1 for c in range(len(cells))]
+        start, places = self.geometry.cell_start[1:-1], self.places
+        of_shapes = np.split(self.paint, start)
         map_place = np.full(len(self.scene.objects) + 1, -1)
-        for number, (place, _) in self.map_of.items():
+        for number, (place, _) in places.of_object.items():
             map_place[number] = place
-        maps = np.split(map_place[self.geometry.object], start)
-        used = (np.concatenate([own, [c], m]) for own, c, m in zip(cells, light, maps, strict=True))
-        return [np.unique(own[own >= 0]) for own in used]
+        of_maps = np.split(map_place[self.geometry.object], start)
+        painted = []
+        for cell, rows in enumerate(zip(of_shapes, of_maps, strict=True)):
+            lightmap, _ = places.of_cell.get(cell, (-1, None))
+            used = np.unique(np.concatenate([*rows, [lightmap]]))
+            painted.append(used[used >= 0])
+        return painted
 
     @cached_property
     def shares(self) -> list[list[float]]:

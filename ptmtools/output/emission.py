@@ -24,7 +24,6 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,23 +33,16 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError
 from ptmtools.files import real_folder, refuse_existing, write_bytes, writing
-from ptmtools.output.content import Content
+from ptmtools.output.content import Content, EmitExtras
 from ptmtools.output.emitter import GZIP, Emitter, File
 from ptmtools.output.emitters import chosen_emitters
 from ptmtools.output.model import EmitReport, TextureRecord, Visit
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, mesh_path, path_of
 from ptmtools.output.options import EmitOptions
-from ptmtools.output.representation import Represented
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.parallel import ordered
-from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs, over_places
-
-if TYPE_CHECKING:
-    from ptmtools.coverage.required_levels import Need
-    from ptmtools.light.model import Light
-
 
 #: Files written at a time.
 _WRITER_THREADS = 8
@@ -209,14 +201,7 @@ def emit(
     textures: tuple[TextureRecord, ...],
     out: str | os.PathLike[str],
     options: EmitOptions = EmitOptions(),  # noqa: B008 - a frozen value
-    progress: Progress = silent,
-    *,
-    force: bool = False,
-    need: Need | None = None,
-    represented: tuple[Represented, ...] = (),
-    light: Light | None = None,
-    map_need: Need | None = None,
-    workers: int = 1,
+    extras: EmitExtras = EmitExtras(),  # noqa: B008 - a frozen value
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
     textures themselves are written by the stage before.
@@ -225,12 +210,7 @@ def emit(
     ----------
     textures: one record for every image that a material in use names, those of lightmaps, and
         those of normal maps.
-    force: overwrite files of these names, gzip copies included.
-    need: the levels that each cell requires, for the records; None leaves them out.
-    represented: other representations of objects, whose files are already written.
-    light: the light of the cells, if baked.
-    map_need: the levels of the normal maps of objects that each cell requires.
-    workers: threads that may be used.
+    extras: results of optional stages, and how to run; `EmitExtras`.
 
     Raises
     ------
@@ -244,40 +224,15 @@ def emit(
     folder = Path(out)
     _check(scene, cells, pvs, ach, textures)
     emitters = chosen_emitters(options.format)
-    owned = [name for emitter in emitters for name in emitter.owns]
-    for name in owned:
-        if not force:
-            remedy = "specify another folder, or use --force to overwrite it"
-            refuse_existing(folder / name, remedy)
+    for name in _owned(emitters) if not extras.force else ():
+        remedy = "specify another folder, or use --force to overwrite it"
+        refuse_existing(folder / name, remedy)
     images = tuple(record for record in textures if record.image >= 0)
     viewpoints, notes = place_viewpoints(scene, cells, options, images)
     content = Content(
-        scene,
-        cells,
-        pvs,
-        ach,
-        textures,
-        viewpoints,
-        options,
-        progress,
-        need,
-        represented,
-        workers,
-        emitters,
-        light,
-        map_need,
+        scene, cells, pvs, ach, textures, options, extras, viewpoints, tuple(emitters)
     )
-    written = [emitter.writer.load()(content) for emitter in emitters]
-    for name in owned:
-        if name.endswith("/"):
-            real_folder(folder, name[:-1])
-    sizes: dict[str, int] = {}
-    entries = {emitter.entry for emitter in emitters}
-    for files in written:
-        # An entry is written after the files that it leads to are on the disk.
-        for _, group in groupby(files, lambda file: file[0] in entries):
-            for file_sizes in write_files(folder, group, force=force, gzip=options.gzip):
-                sizes |= file_sizes
+    sizes = _write_forms(content, folder, gzip=options.gzip)
     return EmitReport(
         files=tuple(sizes),
         viewpoints=viewpoints,
@@ -289,6 +244,26 @@ def emit(
         visit=visit_of(content, sizes),
         notes=notes,
     )
+
+
+def _owned(emitters: Iterable[Emitter]) -> list[str]:
+    return [name for emitter in emitters for name in emitter.owns]
+
+
+def _write_forms(content: Content, folder: Path, *, gzip: bool) -> dict[str, int]:
+    """Writes the files of all emitters; the bytes of each by its name."""
+    written = [emitter.writer.load()(content) for emitter in content.emitters]
+    for name in _owned(content.emitters):
+        if name.endswith("/"):
+            real_folder(folder, name[:-1])
+    sizes: dict[str, int] = {}
+    entries = {emitter.entry for emitter in content.emitters}
+    for files in written:
+        # An entry is written after the files that it leads to are on the disk.
+        for _, group in groupby(files, lambda file: file[0] in entries):
+            for file_sizes in write_files(folder, group, force=content.extras.force, gzip=gzip):
+                sizes |= file_sizes
+    return sizes
 
 
 def _check(

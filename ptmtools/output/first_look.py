@@ -108,8 +108,8 @@ class FirstLooks:
                 ach.texture[of_cell].tolist(), ach.texture_value[of_cell].tolist(), strict=True
             )
             for image, value in pairs:
-                if image in content.records:
-                    shares[content.records[image][0]] += value
+                if image in content.places.of_image:
+                    shares[content.places.of_image[image][0]] += value
         else:
             for other, value in zip(seen.tolist(), ach.row(cell).tolist(), strict=True):
                 for texture, part in zip(

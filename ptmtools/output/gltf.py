@@ -22,7 +22,7 @@ alpha still needs one.)
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import PurePath
 from typing import Any
@@ -36,9 +36,10 @@ from ptmtools.glb import BINARY, JSON, glb, glb_chunks
 from ptmtools.output.content import Content
 from ptmtools.output.geometry import Shape
 from ptmtools.output.gltf_compressed import CompressedBuffer
-from ptmtools.output.gltf_shapes import PlainBuffer, Tables, vertices_of
+from ptmtools.output.gltf_shapes import PlainBuffer, Sizes, Tables, vertices_of
 from ptmtools.output.model import FileError, TextureRecord, shaped
 from ptmtools.output.names import GLTF_FILES, UP, cell_name, mesh_name, mesh_path, path_of
+from ptmtools.output.representation import node_extras, replaced_objects
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material, Wrap
 
@@ -243,9 +244,9 @@ def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
     """
     count = content.cells.cell_count
     for cell in range(count):
-        content.progress(cell, count, "glTF")
+        content.extras.progress(cell, count, "glTF")
         yield path_of(cell, GLTF_FILES), _glb(content, cell, cell_name(cell), _drawn(content, cell))
-    content.progress(count, count, "glTF")
+    content.extras.progress(count, count, "glTF")
     for mesh in content.meshes:
         own = [s for s in content.lit.shapes(mesh.cell) if s.object == mesh.object]
         finer: list[tuple[Tables, Iterable[Shape]]] = [(m, m.shapes) for m in mesh.levels[1:]]
@@ -272,58 +273,63 @@ def _drawn(content: Content, cell: int) -> Iterator[_Drawn]:
             yield from ((level, coarse, place) for coarse in level.shapes)
 
 
-def _normal_coords(content: Content, shape: Shape) -> int | None:
+def _normal_coords(content: Content, shape: Shape, replaced: Container[int]) -> int | None:
     """The number of the coordinates of a shape in the normal map of its material; None if that is
     not drawn: replaced objects have other relief, and coarse meshes no coordinates of their own."""
     normal = content.scene.materials[shape.material].normal
-    if normal is None or shape.object in content.replaced or (normal.own and shape.normal is None):
+    if normal is None or shape.object in replaced or (normal.own and shape.normal is None):
         return None
     return 0 if not normal.own else 1 if shape.light is None else 2
 
 
-def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> bytes:
-    scene, options = content.scene, content.options
-    buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
-    lightmap = content.lightmap_of.get(cell)
-    materials = MaterialWriter(
-        scene.materials, content.records, options.fallback, lightmap, content.map_of
+def _texture_sizes(content: Content, cell: int, shape: Shape, normal: int | None) -> Sizes:
+    """The sizes of the textures that the three pairs of coordinates of a shape refer to."""
+    places, material = content.places, content.scene.materials[shape.material]
+    first = places.of_image[material.image] if material.image >= 0 else None
+    second = (
+        places.of_cell.get(cell) if shape.relief is None else places.of_object.get(shape.object)
     )
+    third = None
+    if normal:
+        third = None if material.normal is None else places.of_image[material.normal.image]
+        second = third if normal == 1 else second
+    sizes = [None if place is None else place[1].finest for place in (first, second, third)]
+    return sizes[0], sizes[1], sizes[2]
+
+
+def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> bytes:
+    scene, options, places = content.scene, content.options, content.places
+    buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
+    lightmap = places.of_cell.get(cell)
+    materials = MaterialWriter(
+        scene.materials, places.of_image, options.fallback, lightmap, places.of_object
+    )
+    represented = content.extras.represented
+    replaced, extras = replaced_objects(represented), node_extras(represented)
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     last = -1
     for tables, shape, place in shapes:
-        image = scene.materials[shape.material].image
-        record = content.records[image][1] if image >= 0 else None
-        vertices = vertices_of(tables, shape, textured=record is not None)
-        relief = None if shape.relief is None else shape.object
-        normal = _normal_coords(content, shape)
+        textured = scene.materials[shape.material].image >= 0
+        vertices = vertices_of(tables, shape, textured=textured)
+        normal = _normal_coords(content, shape, replaced)
         material = materials.take(
             shape.material,
             shape.two_sided,
             place,
             lit=shape.light is not None,
-            relief=relief,
+            relief=None if shape.relief is None else shape.object,
             normal=normal,
         )
-        second = lightmap if relief is None else content.map_of[relief]
-        third = None
-        if normal:
-            own = scene.materials[shape.material].normal
-            third = None if own is None else content.records[own.image]
-            second = third if normal == 1 else second
-        sizes = (
-            None if record is None else record.finest,
-            None if second is None else second[1].finest,
-            None if third is None else third[1].finest,
-        )
+        sizes = _texture_sizes(content, cell, shape, normal)
         primitive = buffer.take(vertices, material, sizes)
         if primitive is None:
             continue
         if shape.object != last:
             last = shape.object
             node: dict[str, Any] = {"name": scene.objects[shape.object], "mesh": len(meshes)}
-            if extras := content.extras.get(shape.object):
-                node["extras"] = extras
+            if last in extras:
+                node["extras"] = extras[last]
             nodes.append(node)
             meshes.append({"primitives": []})
         meshes[-1]["primitives"].append(primitive)

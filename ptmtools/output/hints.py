@@ -74,14 +74,17 @@ def index_text(content: Content) -> str:
         head["textureSets"] = sets
     if content.options.first_look:
         head["firstLook"] = FIRST_LOOK_FILES
+    materials = content.scene.materials
+    # Images that are normal maps of materials, and nothing else.
+    normal_maps = {m.normal.image for m in materials if m.normal} - {m.image for m in materials}
     lists: dict[str, list[Any]] = {
         "viewpoints": [_viewpoint(v) for v in content.viewpoints],
         "textures": [
             _texture(r, content.scene.objects, content.options.fallback)
-            | ({"normals": True} if r.image in content.normal_maps else {})
+            | ({"normals": True} if r.image in normal_maps else {})
             for r in content.textures
         ],
-        **{r.kind.name: list(r.rows) for r in content.represented if r.kind and r.rows},
+        **{r.kind.name: list(r.rows) for r in content.extras.represented if r.kind and r.rows},
         "cells": [
             {"name": cell_name(c), "box": box}
             | ({} if standing else {"standing": False})
@@ -224,8 +227,8 @@ class RecordWriter:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
         if first_look is not None:
             head["firstLook"] = [[piece.texture, piece.level] for piece in first_look]
-        if content.need:
-            head["need"] = self._need(content.need, cell)
+        if content.extras.need:
+            head["need"] = self._need(content.extras.need, cell)
         leaves = [self._leaf(leaf) for leaf in content.leaves[cell]]
         return document_text(head, {"leaves": leaves, "portals": self._portals[cell]})
 
@@ -240,10 +243,10 @@ class RecordWriter:
         """For each visible texture its index, the coarsest required level, and shares."""
         content, cells = self._content, self._content.pvs.row(cell).tolist()
         visible = {place for other in cells for place in content.painted[other].tolist()}
-        images = {image: place for image, (place, _) in content.records.items()}
-        maps = dict(enumerate(place for place, _ in content.map_of.values()))
+        images = {image: place for image, (place, _) in content.places.of_image.items()}
+        maps = dict(enumerate(place for place, _ in content.places.of_object.values()))
         rows = []
-        for measured, places in ((need, images), (content.map_need, maps)):
+        for measured, places in ((need, images), (content.extras.map_need, maps)):
             if measured is None:
                 continue
             for entry in range(*measured.start[cell : cell + 2].tolist()):
@@ -258,17 +261,17 @@ class RecordWriter:
         """The need of the lightmaps of visible cells. A texel of one is so large that every view
         requires the finest level."""
         content = self._content
-        if not content.lightmap_of:
+        if not content.places.of_cell:
             return
         shares = significant(content.ach.value[content.ach.entries(cell)], NEED_DIGITS)
         for other, share in zip(content.pvs.row(cell).tolist(), shares, strict=True):
-            if share and other in content.lightmap_of:
-                place, record = content.lightmap_of[other]
+            if share and other in content.places.of_cell:
+                place, record = content.places.of_cell[other]
                 yield [place, record.level_count - 1, share]
 
     def _texture_shares(self, entry: int) -> list[list[Any]]:
         """The pairs of a texture, None for untextured surfaces, and its share of an ACH entry."""
-        ach, records = self._content.ach, self._content.records
+        ach, records = self._content.ach, self._content.places.of_image
         of_entry = slice(*ach.texture_start[entry : entry + 2].tolist())
         place = [records[i][0] if i in records else None for i in ach.texture[of_entry].tolist()]
         return [list(p) for p in zip(place, significant(ach.texture_value[of_entry]), strict=True)]
@@ -340,11 +343,11 @@ def _files(content: Content, index: str) -> Iterator[tuple[str, str | bytes]]:
     looks = FirstLooks(content) if content.options.first_look else None
     writer, count = RecordWriter(content), content.cells.cell_count
     for cell in range(count):
-        content.progress(cell, count, "hints")
+        content.extras.progress(cell, count, "hints")
         pieces = looks.pieces(cell) if looks else None
         yield path_of(cell, RECORD_FILES), writer.record(cell, pieces)
         if looks and pieces:
             yield path_of(cell, FIRST_LOOK_FILES), looks.bundle(pieces)
-    content.progress(count, count, "hints")
+    content.extras.progress(count, count, "hints")
     yield STATISTICS, statistics_text(content)
     yield HINTS, index

@@ -84,3 +84,24 @@ def representations() -> tuple[Representation, ...]:
 def listed(index: Mapping[str, Any]) -> Iterator[Representation]:
     """The kinds that an index of the hints, or of a site, has a list of."""
     return (kind for kind in representations() if index.get(kind.name))
+
+
+def replaced_objects(represented: Iterable[Represented]) -> frozenset[int]:
+    """The objects of the scene with another representation."""
+    return frozenset(number for kind in represented for number in kind.objects)
+
+
+def object_maps(represented: Iterable[Represented]) -> ObjectMaps | None:
+    """The places of objects in their normal maps, if there are any."""
+    return next((kind.maps for kind in represented if kind.maps), None)
+
+
+def node_extras(represented: Iterable[Represented]) -> dict[int, dict[str, int]]:
+    """Object of the scene → the members of its nodes' "extras": of each kind of representation the
+    number of its row."""
+    extras: dict[int, dict[str, int]] = {}
+    for objects in represented:
+        if objects.kind:
+            for row, number in enumerate(objects.objects):
+                extras.setdefault(number, {})[objects.kind.member] = row
+    return extras

@@ -105,7 +105,7 @@ class CellWriter:
         self._objects, self._materials = content.scene.objects, content.scene.materials
         self._urls = {
             image: f"url {listed(_urls(record, content.options.fallback), 2)}"
-            for image, (_, record) in content.records.items()
+            for image, (_, record) in content.places.of_image.items()
         }
         cells, self._pvs = content.cells, content.pvs
         self._adjacent = cells.adjacent()
@@ -242,11 +242,11 @@ def vrml_files(content: Content) -> Iterator[tuple[str, str]]:
 def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
     boxes, count = [], content.cells.cell_count
     for c in range(count):
-        content.progress(c, count, "cells")
+        content.extras.progress(c, count, "cells")
         text, box = writer.cell(c)
         boxes.append(box)
         yield path_of(c, VRML_FILES), text
-    content.progress(count, count, "cells")
+    content.extras.progress(count, count, "cells")
     yield ROOT, _root_text(content, boxes)
 
 

@@ -49,7 +49,7 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
                 f"the texture {record.file!r} was not encoded",
                 remedy="run the stage `textures` again",
             )
-    sets = ordered(_interlaced, content.textures, content.workers)
+    sets = ordered(_interlaced, content.textures, content.extras.workers)
     for record, written in zip(content.textures, sets, strict=True):
         folder = INTERLACED.texture_files.replace("{name}", texture_name(record.file))
         for name, data in written.named():

@@ -15,7 +15,14 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import DatabaseError, InputError, OutputError
-from ptmtools.output import EmitOptions, GivenViewpoint, TextureRecord, emit, validate_database
+from ptmtools.output import (
+    EmitExtras,
+    EmitOptions,
+    GivenViewpoint,
+    TextureRecord,
+    emit,
+    validate_database,
+)
 from ptmtools.output.emission import compressed
 from ptmtools.output.names import DefNames
 from ptmtools.scene.model import Material
@@ -45,7 +52,7 @@ def write(
     **changes,
 ):
     a = replace(artifacts, **changes)
-    return emit(a.scene, a.cells, a.pvs, a.ach, textures, out, options, force=force)
+    return emit(a.scene, a.cells, a.pvs, a.ach, textures, out, options, EmitExtras(force=force))
 
 
 def shapes(db: Path) -> list[VrmlNode]:

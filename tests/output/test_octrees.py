@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.output import EmitOptions, emit, validate_database
+from ptmtools.output import EmitExtras, EmitOptions, emit, validate_database
 from ptmtools.output.names import HINTS
 from ptmtools.output.representation import Represented
 from ptmtools_systems.apo.declarations import OCTREES
@@ -60,7 +60,16 @@ def whole(artifacts, tmp_path_factory, put_textures, seal) -> Path:
     a, textures = artifacts, put_textures(db / "www")
     octrees = put_octrees(db / "www")
     options = EmitOptions(format="vrml")
-    emit(a.scene, a.cells, a.pvs, a.ach, textures, db / "www", options, represented=(octrees,))
+    emit(
+        a.scene,
+        a.cells,
+        a.pvs,
+        a.ach,
+        textures,
+        db / "www",
+        options,
+        EmitExtras(represented=(octrees,)),
+    )
     seal(db)
     return db
 

@@ -12,7 +12,7 @@ import pytest
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.required_levels import TextureSize, compute_need
-from ptmtools.output import TextureRecord, emit, validate_database
+from ptmtools.output import EmitExtras, TextureRecord, emit, validate_database
 from ptmtools.output.content import Content
 from ptmtools.output.hints import RecordWriter
 from ptmtools.visibility.model import Pvs
@@ -56,7 +56,8 @@ def test_how_fine_textures_are_needed(artifacts, tmp_path: Path, put_textures, s
     records = put_textures(db / "www")[::-1]
     sizes = {r.image: TextureSize(r.width, r.height, len(r.levels)) for r in records}
     need = compute_need(a.scene, a.cells, a.pvs, sizes, 4)
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", need=need)
+    extras = EmitExtras(need=need)
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", extras=extras)
     seal(db)
     assert validate_database(db).issues == ()
     assert disagreements(db / "www") == []

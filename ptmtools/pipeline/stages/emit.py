@@ -45,14 +45,24 @@ class EmissionJob(Job):
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """See `Job.make`."""
-        from ptmtools.output import emit
+        from ptmtools.output import EmitExtras, emit
+        from ptmtools.output.representation import object_maps
 
         run, light, scene = self.run, self.run.stored(LIGHT), self.run[SCENE]
         images = texture_records(run)
         represented = tuple(_represented(run))
         maps = tuple(texture for kind in represented for texture in kind.textures)
-        places = next((kind.maps for kind in represented if kind.maps), None)
+        places = object_maps(represented)
         textures = (*images, *lightmap_records(run, light), *maps)
+        extras = EmitExtras(
+            light=light,
+            represented=represented,
+            need=self._need(scene, {record.image: record for record in images}),
+            map_need=self._need(places.painted(scene), dict(enumerate(maps))) if places else None,
+            force=True,
+            progress=run.progress,
+            workers=run.workers.executor.workers,
+        )
         report = emit(
             scene,
             run[CELLS],
@@ -61,13 +71,7 @@ class EmissionJob(Job):
             textures,
             transaction.subfolder(SERVED),
             self.options,
-            run.progress,
-            force=True,
-            need=self._need(scene, {record.image: record for record in images}),
-            represented=represented,
-            light=light,
-            map_need=(self._need(places.painted(scene), dict(enumerate(maps))) if places else None),
-            workers=run.workers.executor.workers,
+            extras,
         )
         for name in report.files:
             transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
