@@ -97,11 +97,13 @@ def read(kind: str, seed: int, number: int) -> tuple[str, float]:
 
 def _decoded(path: Path) -> str:
     """As the reader of glTF has it decoded."""
-    from ptmtools.scene.gltf import draco as reader
+    from ptmtools.scene.gltf import compression as reader
     from ptmtools.scene.sandbox import run_in_sandbox
 
     path.rename(path.with_name("0.drc"))
-    run_in_sandbox(reader.__name__, "Draco", path.with_name("0.drc"), str(path.parent), "1")
+    run_in_sandbox(
+        reader.__name__, "Draco", path.with_name("0.drc"), "meshes", str(path.parent), "1"
+    )
     return "read" if path.with_name("0.npz").exists() else ""
 
 

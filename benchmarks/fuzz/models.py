@@ -349,9 +349,9 @@ class Mesh:
     limit = 1 << 26
 
     def __init__(self, folder: Path, outside: Path) -> None:
-        from ptmtools.scene import formats
+        from ptmtools.scene import libraries
 
-        formats.convert = _no_meshlab
+        libraries.convert = _no_meshlab
         furnished(folder, outside)
         self._folder = folder
         corners = "0 0 0\n10 0 0\n10 4 0\n0 4 0\n"
