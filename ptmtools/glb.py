@@ -122,9 +122,9 @@ class BufferWriter:
 
     def positions(self, point: NDArray[np.floating[Any]]) -> int:
         """(n, 3), with the bounds that glTF requires."""
-        held = point.astype("<f4")
-        ends = {"min": held.min(axis=0), "max": held.max(axis=0)}
-        return self._attribute(held, {name: self._numbers(end) for name, end in ends.items()})
+        stored = point.astype("<f4")
+        ends = {"min": stored.min(axis=0), "max": stored.max(axis=0)}
+        return self._attribute(stored, {name: self._numbers(end) for name, end in ends.items()})
 
     def vectors(self, values: NDArray[np.floating[Any]]) -> int:
         """(n, 2) or (n, 3) of float32: texture coordinates, normals."""

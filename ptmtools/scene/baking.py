@@ -88,10 +88,10 @@ class MaskedBytes:
             white = np.full_like(opacity, 255)
             return png_bytes(np.stack([white, opacity], axis=2))
         texels, description = integers(self.read(), self.limit)
-        alpha = _resized(opacity, texels.shape[1], texels.shape[0]) / 255
+        alpha = _resize(opacity, texels.shape[1], texels.shape[0]) / 255
         colors = _colors(texels)
-        own = colors.shape[2] < texels.shape[2]
-        alpha *= texels[..., -1] if own else np.iinfo(texels.dtype).max
+        has_alpha = colors.shape[2] < texels.shape[2]
+        alpha *= texels[..., -1] if has_alpha else np.iinfo(texels.dtype).max
         alpha = np.rint(alpha).astype(texels.dtype)[..., None]
         return png_bytes(np.concatenate([colors, alpha], axis=2), description)
 
@@ -117,7 +117,7 @@ def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
     return np.asarray(np.rint(colors @ np.array([0.299, 0.587, 0.114])).astype(np.uint8))
 
 
-def _resized(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.float64]:
+def _resize(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.float64]:
     from PIL import Image
 
     if opacity.shape != (height, width):
@@ -135,9 +135,9 @@ def _merge_mask(material: SourceMaterial, store: ImageStore, notes: IngestNotes)
     if opacities is None:  # an unreadable mask must not hide anything
         return replace(without, see_through=True)
     image = None if texture is None else store.record(texture)
-    own = texture is not None and texture.read == mask.read and mask.channel in ("", "m")
+    same_image = texture is not None and texture.read == mask.read and mask.channel in ("", "m")
     # The mask is the alpha of the image, or opaque.
-    if (image is not None and image.alpha and own) or opacities.bits is None:
+    if (image is not None and image.alpha and same_image) or opacities.bits is None:
         return without
     colors = None if image is None or texture is None else texture.read
     read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
@@ -187,7 +187,7 @@ def _bake_mirror(
     for axis in (0, 1):
         if wraps[axis] != "mirror":
             continue
-        folded = _folded(uv[..., axis])
+        folded = _fold(uv[..., axis])
         if folded is None:
             wraps[axis], doubled[axis] = "repeat", True
             coords[..., axis] /= 2
@@ -207,7 +207,7 @@ def _bake_mirror(
     return baked, coords
 
 
-def _folded(coordinate: Floats) -> Floats | None:
+def _fold(coordinate: Floats) -> Floats | None:
     """(T, 3) coordinates of triangles mirrored into [0, 1]; None if a triangle crosses the edge of
     a repetition."""
     lowest = np.floor(coordinate.min(axis=1, initial=np.inf))
@@ -283,9 +283,9 @@ def near_origin(uv: Floats, group: Ints, repeats: Bools) -> Floats:
     """
     if not (uv.max(initial=0.0) > FAR or uv.min(initial=0.0) < -FAR):
         return uv
-    far, uv = (np.abs(uv).max(axis=1) > FAR) & repeats, uv.copy()
+    distant, uv = (np.abs(uv).max(axis=1) > FAR) & repeats, uv.copy()
     order = np.argsort(group, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        for axis in np.flatnonzero(far[rows].any(axis=0)):
+        for axis in np.flatnonzero(distant[rows].any(axis=0)):
             uv[rows, :, axis] -= 2 * np.floor(np.median(uv[rows, :, axis]) / 2)
     return uv

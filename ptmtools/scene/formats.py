@@ -151,7 +151,7 @@ USD = ModelFormat(
 USDZ = replace(USD, name="usdz", about="USDZ", suffixes=(".usdz",))
 
 
-def _of_library(name: str, about: str = "", reader: str = "read_by_pymeshlab") -> ModelFormat:
+def _mesh_format(name: str, about: str = "", reader: str = "read_by_pymeshlab") -> ModelFormat:
     place = f"ptmtools.scene.libraries:{reader}"
     return ModelFormat(name, about or name.upper(), (f".{name}",), Lazy(place))
 
@@ -161,15 +161,15 @@ FORMATS = {
     row.name: row
     for row in (
         *(OBJ, GLB, GLTF),
-        _of_library("ply", reader="read_ply"),
-        _of_library("stl", reader="read_stl"),
-        _of_library("off", reader="read_off"),
-        _of_library("3ds", "3D Studio"),
-        _of_library("3mf"),
-        _of_library("ctm", "OpenCTM"),
-        _of_library("dae", "COLLADA"),
-        _of_library("wrl", "VRML"),
-        _of_library("x3d"),
+        _mesh_format("ply", reader="read_ply"),
+        _mesh_format("stl", reader="read_stl"),
+        _mesh_format("off", reader="read_off"),
+        _mesh_format("3ds", "3D Studio"),
+        _mesh_format("3mf"),
+        _mesh_format("ctm", "OpenCTM"),
+        _mesh_format("dae", "COLLADA"),
+        _mesh_format("wrl", "VRML"),
+        _mesh_format("x3d"),
         *(IFC, IFCZIP, USD, USDZ),
     )
 }

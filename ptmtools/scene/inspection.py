@@ -130,15 +130,15 @@ def _guesses(scene: Scene, usual: Up | None) -> list[Guess]:
     axis = next(candidate for candidate in ranked if candidate.up != best.up)
     unit = next(candidate for candidate in ranked[1:] if candidate.up == best.up)
     others = [candidate for candidate in ranked if candidate in (axis, unit)]
-    return [_guess(best, others[0]), *(_guess(other, best) for other in others)]
+    return [_guess(best, others[0]), *(_guess(rival, best) for rival in others)]
 
 
-def _guess(candidate: Candidate, other: Candidate) -> Guess:
+def _guess(candidate: Candidate, rival: Candidate) -> Guess:
     return Guess(
         unit=candidate.unit,
         up=candidate.up,
         size=candidate.size,
-        reasons=tuple(candidate.reasons(other)),
+        reasons=tuple(candidate.reasons(rival)),
         cost=round(candidate.cost, 3),
-        rival=candidate.rivals(other),
+        rival=candidate.rivals(rival),
     )

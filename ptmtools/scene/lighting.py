@@ -48,7 +48,7 @@ def lights_of(
     return Lights(
         np.array([images.glow(material) for material in materials], np.float32),
         np.array([material.unlit for material in materials], np.bool_),
-        tuple(_placed(lamp, space) for lamp in source.lamps),
+        tuple(_place(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
         np.zeros((0, 3, 2), np.float32),
         (),
@@ -122,7 +122,7 @@ def _mean(data: bytes, limit: int) -> float:
     return float(luminance(counts @ light / counts.sum(axis=1)))
 
 
-def _placed(lamp: Lamp, space: Space) -> Lamp:
+def _place(lamp: Lamp, space: Space) -> Lamp:
     x, y, z = to_world(np.array([lamp.position]), space)[0].tolist()
     dx, dy, dz = rotated(np.array([lamp.direction]), space.up)[0].tolist()
     return replace(lamp, position=(x, y, z), direction=(dx, dy, dz))

@@ -107,7 +107,7 @@ class Lights:
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The lights as plain arrays. Maps of the same image share its bytes."""
-        images = list(dict.fromkeys(each.data for each in self.maps))
+        images = list(dict.fromkeys(item.data for item in self.maps))
         start = np.cumsum([0, *map(len, images)])
         rows = [
             [*lamp.position, *lamp.direction, lamp.intensity, *lamp.cone] for lamp in self.lamps
@@ -119,11 +119,11 @@ class Lights:
             "lamp": np.array(rows, np.float64).reshape(-1, 9),
             "map": self.map,
             "uv": self.uv,
-            "map_image": np.array([images.index(each.data) for each in self.maps], np.int32),
+            "map_image": np.array([images.index(item.data) for item in self.maps], np.int32),
             "map_wrap": np.array(
-                [[WRAPS.index(way) for way in each.wrap] for each in self.maps], np.uint8
+                [[WRAPS.index(way) for way in item.wrap] for item in self.maps], np.uint8
             ).reshape(-1, 2),
-            "map_strength": np.array([each.strength for each in self.maps], np.float64),
+            "map_strength": np.array([item.strength for item in self.maps], np.float64),
             "image": np.frombuffer(b"".join(images), np.uint8),
             "image_start": start.astype(np.int64),
         }

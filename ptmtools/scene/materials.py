@@ -114,20 +114,20 @@ def _normal_coordinates(
     """(T, 3, 2) of kept faces, finite and near the origin, in the normal maps that have their own
     coordinates: those of the source, or else ``uv``; ``material`` (T,) of each face. None without.
     """
-    own = np.array([m.normal is not None and m.normal.own for m in materials], np.bool_)[material]
-    if not own.any():
+    separate = np.array([m.normal is not None and m.normal.own for m in materials], bool)[material]
+    if not separate.any():
         return None
     result = np.zeros_like(uv)
-    result[own] = uv[own]
+    result[separate] = uv[separate]
     if source.normal_uv is not None:
         given = source.normal_uv[kept.source]
         has = [m.normal is not None and m.normal.own for m in source.materials]
-        other = own & np.array(has, np.bool_)[source.triangle_material[kept.source]]
-        result[other] = given[other]
+        given_rows = separate & np.array(has, np.bool_)[source.triangle_material[kept.source]]
+        result[given_rows] = given[given_rows]
     fits = np.isfinite(result).all(axis=(1, 2)) & (np.abs(result) <= LARGEST).all(axis=(1, 2))
     result[~fits] = 0.0
     wraps = [(m.normal.wrap_s, m.normal.wrap_t) if m.normal else ("clamp",) * 2 for m in materials]
-    repeats = np.array([[wrap == "repeat" for wrap in each] for each in wraps], np.bool_)
+    repeats = np.array([[wrap == "repeat" for wrap in pair] for pair in wraps], np.bool_)
     owner = source.triangle_object[kept.source]
     return near_origin(result, material * np.int64(len(source.objects)) + owner, repeats[material])
 

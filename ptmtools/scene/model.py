@@ -295,11 +295,13 @@ class Scene:
         used = [m.image for m in materials] + [m.normal.image for m in materials if m.normal]
         if max(used, default=-1) >= len(images):
             raise ValueError("a material refers to a missing image")
-        own = any(material.normal and material.normal.own for material in materials)
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n = len(triangles)
         stored = stored.repeated(n, *_OFTEN_ALIKE)
+        normal_uv = None
+        if any(material.normal and material.normal.own for material in materials):
+            normal_uv = stored.array("normal_uv", np.float64, n, 3, 2, finite=True)
         return Scene(
             points=points,
             triangles=triangles,
@@ -308,7 +310,7 @@ class Scene:
             triangle_material=stored.indices("triangle_material", np.int32, n, high=len(materials)),
             two_sided=stored.array("two_sided", np.bool_, n),
             colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
-            normal_uv=stored.array("normal_uv", np.float64, n, 3, 2, finite=True) if own else None,
+            normal_uv=normal_uv,
             objects=objects,
             materials=materials,
             tolerance=Tolerance.from_arrays(arrays),
@@ -350,11 +352,11 @@ def rooms_of(stored: Stored, names: Sequence[str]) -> tuple[RoomVolume, ...]:
     begin = stored.starts("room_triangle_start", count, len(triangles))
     rooms = []
     for k, name in enumerate(names):
-        own = points[first[k] : first[k + 1]]
+        part = points[first[k] : first[k + 1]]
         faces = triangles[begin[k] : begin[k + 1]]
-        if faces.max(initial=-1) >= len(own):
+        if faces.max(initial=-1) >= len(part):
             raise ValueError("a triangle of a room refers to a missing point")
-        rooms.append(RoomVolume(name, own, faces))
+        rooms.append(RoomVolume(name, part, faces))
     return tuple(rooms)
 
 

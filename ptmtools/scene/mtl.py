@@ -73,7 +73,7 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
     numbers: dict[str, list[float]] = {}
     at = 0
     while at < len(words) and (name := words[at][0].lower()) in OPTIONS:
-        least, most = OPTIONS[name]
+        least, largest = OPTIONS[name]
         arguments = [argument for argument, _ in words[at + 1 : at + 1 + least]]
         if len(arguments) < least:
             raise ValueError(f"{name} lacks an argument")
@@ -84,7 +84,7 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
         numbers[name] = [number(argument) for argument in arguments]
         # Further arguments only if they are numbers; the last word always belongs to the file.
         with suppress(ValueError):
-            while len(numbers[name]) < most and at < len(words) - 1:
+            while len(numbers[name]) < largest and at < len(words) - 1:
                 numbers[name].append(number(words[at][0]))
                 at += 1
     if at >= len(words):

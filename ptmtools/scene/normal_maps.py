@@ -62,9 +62,9 @@ def normals_of(height: NDArray[Any], factor: float = 1.0) -> NDArray[np.uint8]:
         # With a row on either side.
         around = np.arange(rows.start - 1, rows.stop + 1) % len(height)
         strip = height[around].astype(np.float32) * np.float32(factor)
-        own = strip[1:-1]
-        normal = np.ones((*own.shape, 3), np.float32)
-        normal[..., 0] = (np.roll(own, 1, axis=1) - np.roll(own, -1, axis=1)) / 2
+        center = strip[1:-1]
+        normal = np.ones((*center.shape, 3), np.float32)
+        normal[..., 0] = (np.roll(center, 1, axis=1) - np.roll(center, -1, axis=1)) / 2
         normal[..., 1] = (strip[2:] - strip[:-2]) / 2
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         result[rows] = np.rint(127.5 * (normal + 1))
@@ -101,11 +101,11 @@ class NormalMaps:
         if "mirror" in (use.wrap_s, use.wrap_t):
             self._note(use, "mirrored repetition of a normal map ignored")
         wraps = emitted_wraps(use)
-        own = normal.own or moved or texture is None or wraps != emitted_wraps(texture)
+        separate = normal.own or moved or texture is None or wraps != emitted_wraps(texture)
         image, scale = self._normals(use, scale, height=normal.height)
         if image is None or (added := self._store.add(image)) is None:
             return None
-        return NormalImage(added[0], scale, *wraps, own)
+        return NormalImage(added[0], scale, *wraps, separate)
 
     def _normals(
         self, use: SourceTexture, scale: float, *, height: bool

@@ -312,9 +312,6 @@ def read_obj(
     `read_mtl`.
     """
     statements = _read_statements(path, notes, progress, options.max_triangles)
-    for key, lines in statements.unknown.items():
-        kind = _NOT_DRAWN.get(key, "unknown statement")
-        notes.note("PTM-N215", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
     if not statements.face_line:
         unknown = next(iter(statements.unknown.values()), None)
         garbage = None if statements.points else unknown
@@ -480,5 +477,8 @@ def _read_statements(
     if short := statements.short:
         message = "faces of fewer than three corners"
         notes.miss("PTM-N214", message, f"{path.name}:{short[0]}", len(short))
+    for key, lines in statements.unknown.items():
+        kind = _NOT_DRAWN.get(key, "unknown statement")
+        notes.note("PTM-N215", f"{key}: {kind}, skipped", f"{path.name}:{lines[0]}", len(lines))
     progress(size, size, "reading")
     return statements

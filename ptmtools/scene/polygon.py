@@ -102,12 +102,12 @@ def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.boo
         right = (np.einsum("mkc,mc->mk", cross, normal) > ROUNDING_SHARE).all(axis=1)
     cut = np.tile(fan, (m, 1, 1))
     if n == 4:
-        other = np.array([[1, 2, 3], [1, 3, 0]])
+        second_fan = np.array([[1, 2, 3], [1, 3, 0]])
         with np.errstate(all="ignore"):
             b = shape - shape[:, 1:2]
             halves = np.stack([np.cross(b[:, 2], b[:, 3]), np.cross(b[:, 3], b[:, 0])], axis=1)
             turned = (np.einsum("mkc,mc->mk", halves, normal) > ROUNDING_SHARE).all(axis=1)
-        cut[turned & ~right] = other
+        cut[turned & ~right] = second_fan
         right |= turned
     # Ingest drops non-finite polygons later, and they cannot be clipped.
     right |= ~np.isfinite(shape).all(axis=(1, 2))

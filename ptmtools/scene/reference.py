@@ -119,20 +119,20 @@ class ModelFolder:
         return str(path.relative_to(self.root)) if path.is_relative_to(self.root) else path.name
 
     def _walk(self, start: Path, steps: list[str]) -> Path | None:
-        here = start
+        path = start
         try:
             for step in steps:
                 if step == "..":
-                    here = here / step
+                    path = path / step
                     continue
-                exact = here / step
+                exact = path / step
                 if not exact.exists():
-                    listing = self._list(here)
+                    listing = self._list(path)
                     if _fold(step) not in listing:
                         return None
-                    exact = here / listing[_fold(step)]
-                here = exact
-            return here if steps and here.is_file() else None
+                    exact = path / listing[_fold(step)]
+                path = exact
+            return path if steps and path.is_file() else None
         except (OSError, ValueError):  # a name that is too long or contains a NUL byte
             return None
 

@@ -336,11 +336,11 @@ def vertex_colors(
     has, color = np.zeros(count, dtype=bool), np.zeros((count, 3), dtype=np.uint8)
     has[colored] = True
     color[colored] = np.rint(np.clip(scale * finite, 0, 255)).astype(np.uint8)
-    own = has[triangles]
+    has_color = has[triangles]
     merged = np.zeros(len(materials), dtype=bool)
-    merged[triangle_material[own.any(axis=1)]] = True
+    merged[triangle_material[has_color.any(axis=1)]] = True
     tint = np.array([m.color or _WHITE for m in materials]) * merged[:, None] + ~merged[:, None]
     plain = np.rint(255 * tint).astype(np.uint8)[triangle_material]
-    corners = np.where(own[..., None], color[triangles], plain[:, None])
+    corners = np.where(has_color[..., None], color[triangles], plain[:, None])
     white = (replace(m, color=_WHITE) if t else m for m, t in zip(materials, merged, strict=True))
     return tuple(white), corners

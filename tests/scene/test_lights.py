@@ -12,7 +12,7 @@ import pytest
 
 from ptmtools.scene import IngestOptions, Scene, ingest, lighting
 from ptmtools.scene.colors import luminance, to_linear
-from ptmtools.scene.lighting import _placed
+from ptmtools.scene.lighting import _place
 from ptmtools.scene.lights import MOST, Lamp, Lights
 from ptmtools.scene.model import Space
 from ptmtools.texture.images.png import png_bytes
@@ -337,6 +337,6 @@ def test_a_lightmap_that_is_missing(put: Put) -> None:
 
 def test_units_and_axes_count(put: Put) -> None:
     lamp = Lamp("point", (1.0, 2.0, 3.0))
-    placed = _placed(lamp, Space((1.0, 0.0, 1.0), 0.01, "z"))
+    placed = _place(lamp, Space((1.0, 0.0, 1.0), 0.01, "z"))
     assert placed.position == pytest.approx((0, 0.02, -0.02))
     assert placed.direction == pytest.approx((0, 0, 1))

@@ -75,14 +75,14 @@ class GltfDocument:
         if compressed is None:
             return self._part(view, f"buffer view {index}")
         if index not in self._decoded:
-            self._decoded[index] = self._decompressed(index, compressed)
+            self._decoded[index] = self._decompress(index, compressed)
         buffer = self._decoded[index]
         length = natural(view["byteLength"])
         if length > len(buffer.data):
             raise ValueError(f"buffer view {index} exceeds its decompressed bytes")
         return buffer, 0, length
 
-    def _decompressed(self, index: int, compressed: dict[str, Any]) -> Buffer:
+    def _decompress(self, index: int, compressed: dict[str, Any]) -> Buffer:
         size = natural(compressed["count"]) * natural(compressed["byteStride"])
         self._budget -= size
         if self._budget < 0:
@@ -122,12 +122,12 @@ class GltfDocument:
                     raise ValueError("no elements")
                 stored = np.zeros(shape, np.dtype(COMPONENTS[accessor["componentType"]]))
             if "sparse" in accessor:
-                stored = self._substituted(stored, accessor)
+                stored = self._substitute(stored, accessor)
         except ValueError as error:
             raise ValueError(f"accessor {index}: {error}") from None
         return meaning(stored, bool(accessor.get("normalized")))
 
-    def _substituted(self, stored: NDArray[Any], accessor: dict[str, Any]) -> NDArray[Any]:
+    def _substitute(self, stored: NDArray[Any], accessor: dict[str, Any]) -> NDArray[Any]:
         """The elements with the substitutes of a sparse accessor (section 3.6.2.3)."""
         sparse = accessor["sparse"]
         count = natural(sparse["count"])
@@ -166,7 +166,7 @@ def fault_of(error: Exception) -> str:
     return text.splitlines()[0] if text else type(error).__name__
 
 
-def damaged(path: Path, reason: str, place: str | None = None) -> InputError:
+def damage(path: Path, reason: str, place: str | None = None) -> InputError:
     """The error for a file that violates glTF 2.0, PTM-I249."""
     return InputError(
         "PTM-I249",
@@ -182,19 +182,19 @@ def open_document(path: Path, folder: ModelFolder) -> GltfDocument:
 
     Raises InputError if the container is damaged or a buffer is missing.
     """
-    tree, binary = _opened(path)
+    tree, binary = _read_container(path)
     version = str(tree["asset"].get("version", ""))
     if not version.startswith("2."):
-        raise damaged(path, f"version {version!r}")
+        raise damage(path, f"version {version!r}")
     return GltfDocument(path, tree, _buffers(path, tree, folder, binary))
 
 
 def document_json(path: Path) -> dict[str, Any]:
     """The JSON of a .glb or .gltf file. Raises InputError if the container is damaged."""
-    return _opened(path)[0]
+    return _read_container(path)[0]
 
 
-def _opened(path: Path) -> tuple[dict[str, Any], Buffer | None]:
+def _read_container(path: Path) -> tuple[dict[str, Any], Buffer | None]:
     """The JSON, and the binary chunk of a GLB."""
     data = path.read_bytes()
     binary: Buffer | None = None
@@ -202,21 +202,21 @@ def _opened(path: Path) -> tuple[dict[str, Any], Buffer | None]:
         try:
             (_, _, text), *more = glb_chunks(data)
         except ValueError as error:
-            raise damaged(path, *error.args) from None
+            raise damage(path, *error.args) from None
         bodies = (Buffer(body, path.absolute(), at) for kind, at, body in more if kind == BINARY)
         binary = next(bodies, None)
     else:
         text = data
     try:
-        tree = _parsed(decode(text))
+        tree = _parse(decode(text))
     except (ValueError, RecursionError) as error:
-        raise damaged(path, f"invalid JSON ({error})") from None
+        raise damage(path, f"invalid JSON ({error})") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise damaged(path, "the JSON is not a glTF document")
+        raise damage(path, "the JSON is not a glTF document")
     return tree, binary
 
 
-def _parsed(text: str) -> Any:
+def _parse(text: str) -> Any:
     """Parsed JSON, with single surrogates replaced by question marks; ValueError for invalid JSON,
     NaN included."""
     tree = json.loads(text, parse_constant=_reject_constant)
@@ -247,7 +247,7 @@ def _buffers(
         elif str(entry["uri"]).startswith("data:"):
             entries.append(Buffer(data_uri(path, entry["uri"], place), None))
         else:
-            file = _external(path, folder, str(entry["uri"]), place)
+            file = _external_file(path, folder, str(entry["uri"]), place)
             entries.append(file)
             longest[file] = max(lengths[-1], longest.get(file, 0))
     read: dict[Path, Buffer] = {}
@@ -258,11 +258,11 @@ def _buffers(
     buffers = [read[entry] if isinstance(entry, Path) else entry for entry in entries]
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
         if buffer is not None and len(buffer.data) < length:
-            raise damaged(path, f"{len(buffer.data)} bytes instead of {length}", f"buffer {index}")
+            raise damage(path, f"{len(buffer.data)} bytes instead of {length}", f"buffer {index}")
     return buffers
 
 
-def _external(path: Path, folder: ModelFolder, uri: str, place: str) -> Path:
+def _external_file(path: Path, folder: ModelFolder, uri: str, place: str) -> Path:
     """The file of a buffer. Raises InputError PTM-I203, PTM-I205."""
     result = folder.find(unquote(uri))
     if result.path is None:
@@ -285,7 +285,7 @@ def data_uri(path: Path, uri: str, place: str) -> bytes:
             raise ValueError("not base64")
         return base64.b64decode(unquote(body), validate=True)
     except (ValueError, binascii.Error) as error:
-        raise damaged(path, f"data URI {head[:40]}: {error}", place) from None
+        raise damage(path, f"data URI {head[:40]}: {error}", place) from None
 
 
 #: Support of an extension: applied; without effect on the emitted files; dropped with a note.

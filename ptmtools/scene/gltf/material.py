@@ -34,7 +34,7 @@ from ptmtools.scene.source import (
 #: Maps the JSON of a material to that of one of its textures.
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
 T = TypeVar("T")
-#: A texture, and as `_placing`.
+#: A texture, and as `_placement`.
 _Placed: TypeAlias = "tuple[SourceTexture | None, str, NDArray[np.float64], bool]"
 
 _UNLIT = "KHR_materials_unlit"
@@ -107,23 +107,14 @@ class GltfMaterialReader:
         place = f"material {index}"
         name = str(entry.get("name") or ("default" if index is None else place))
         extensions = entry.get("extensions", {})
-        base = entry.get("pbrMetallicRoughness", {})
-        factor = base.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
-        use = base.get("baseColorTexture")
-        glossy = extensions.get("KHR_materials_pbrSpecularGlossiness")
-        if glossy is not None:
-            factor = glossy.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0])
-            use = glossy.get("diffuseTexture")
+        factor, use = _base_color(entry)
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
             self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
-        mode = entry.get("alphaMode", "OPAQUE")
-        tested = mode == "MASK"
-        cutoff = float(entry.get("alphaCutoff", 0.5)) if tested else 0.0
-        opacity = {"BLEND": a, "MASK": float(a >= cutoff)}.get(mode, 1.0)
-        see_through = mode in ("MASK", "BLEND")
+        see_through = entry.get("alphaMode") in ("MASK", "BLEND")
+        alpha = _alpha(entry, a)
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
             self._notes.note("PTM-N215", f"{name}: transmits light, never occludes", place)
             see_through = True
@@ -134,38 +125,25 @@ class GltfMaterialReader:
             what = f"{name}: texture"
             placed = self._optional("PTM-N204", what, place, self._other, entry) or placed
         elif use is not None:
-            placed = self._placed(use, place)
+            placed = self._place(use, place)
         texture, coords, matrix, moved = placed
         if moved:
             message = f"{name}: KHR_texture_transform baked into its faces"
             self._notes.note("PTM-N215", message, place)
-        normal, normal_coords, normal_matrix = None, None, None
-        relief = glow = None
-        if self._normals and "normalTexture" in entry:
-            what = f"{name}: normal map"
-            relief = self._optional("PTM-N215", what, place, self._normal, entry)
-        if relief is not None:
-            image, scale, normal_coords, normal_matrix = relief
-            same = texture is not None and normal_coords == coords
-            own = not (same and np.array_equal(normal_matrix, matrix))
-            normal = NormalTexture(image, scale, own=own)
-            if not own:
-                normal_coords = normal_matrix = None
+        normal, normal_coords, normal_matrix = self._normal_texture(entry, name, place, placed)
+        glow = None
         if self._texture_of is None:
             glow = self._optional("PTM-N215", f"{name}: emission", place, self._glow, entry)
         self._materials.append(
             SourceMaterial(
                 name=name,
                 color=(red, green, blue),
-                opacity=opacity,
                 see_through=see_through,
-                ignores_alpha=mode not in ("MASK", "BLEND"),
-                # The cutoff of a texel, because the factor's alpha scales all texels.
-                cutoff=max(cutoff / a, 0.0) if tested and opacity and a > 0 else None,
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
                 normal=normal,
-                unlit=_UNLIT in entry.get("extensions", {}),
+                unlit=_UNLIT in extensions,
+                **alpha,
                 **(glow or {}),
             )
         )
@@ -195,24 +173,40 @@ class GltfMaterialReader:
             self._notes.note(code, f"{what} left out: {fault_of(fault)}", place)
             return None
 
-    def _placed(self, use: dict[str, Any], place: str) -> _Placed:
+    def _place(self, use: dict[str, Any], place: str) -> _Placed:
         """A texture that a material names."""
         texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
-        return texture, *_placing(use)
+        return texture, *_placement(use)
 
     def _other(self, entry: dict[str, Any], place: str) -> _Placed | None:
         """The texture in place of that of the base colour."""
         assert self._texture_of
         use = self._texture_of(entry)
-        return None if use is None else self._placed(use, place)
+        return None if use is None else self._place(use, place)
+
+    def _normal_texture(
+        self, entry: dict[str, Any], name: str, place: str, placed: _Placed
+    ) -> tuple[NormalTexture | None, str | None, NDArray[np.float64] | None]:
+        """The normal map of a material with a texture ``placed``; and its coordinates and their
+        matrix, None if they are those of the texture."""
+        relief = None
+        if self._normals and "normalTexture" in entry:
+            what = f"{name}: normal map"
+            relief = self._optional("PTM-N215", what, place, self._normal, entry)
+        if relief is None:
+            return None, None, None
+        image, scale, coords, matrix = relief
+        if placed[0] is not None and coords == placed[1] and np.array_equal(matrix, placed[2]):
+            return NormalTexture(image, scale), None, None
+        return NormalTexture(image, scale, own=True), coords, matrix
 
     def _normal(
         self, entry: dict[str, Any], place: str
     ) -> tuple[SourceTexture, float, str, NDArray[np.float64]] | None:
-        """The image of a normal map, its scale, and as `_placing`."""
+        """The image of a normal map, its scale, and as `_placement`."""
         use = entry["normalTexture"]
         scale = _finite(use.get("scale", 1.0))
-        image, coords, matrix, _ = self._placed(use, place)
+        image, coords, matrix, _ = self._place(use, place)
         return None if image is None else (image, scale, coords, matrix)
 
     def _glow(self, entry: dict[str, Any], place: str) -> dict[str, Any]:
@@ -234,7 +228,7 @@ class GltfMaterialReader:
         sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
         sources = [texture, *texture.get("extensions", {}).values()]
         # The image without an extension has the least loss.
-        source = next((each["source"] for each in sources if "source" in each), None)
+        source = next((entry["source"] for entry in sources if "source" in entry), None)
         what = f"texture {index}"
         if source is None:
             self._notes.miss("PTM-N204", f"{what}: has no image", place)
@@ -265,6 +259,30 @@ class GltfMaterialReader:
         )
 
 
+def _base_color(entry: dict[str, Any]) -> tuple[list[Any], dict[str, Any] | None]:
+    """The factor of a material's base colour, and its texture."""
+    color = entry.get("pbrMetallicRoughness", {})
+    names = "baseColorFactor", "baseColorTexture"
+    glossy = entry.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    if glossy is not None:
+        color, names = glossy, ("diffuseFactor", "diffuseTexture")
+    return color.get(names[0], [1.0, 1.0, 1.0, 1.0]), color.get(names[1])
+
+
+def _alpha(entry: dict[str, Any], factor: float) -> dict[str, Any]:
+    """The effect of alpha by the mode of a material, as fields of a `SourceMaterial`."""
+    mode = entry.get("alphaMode", "OPAQUE")
+    cutoff = float(entry.get("alphaCutoff", 0.5)) if mode == "MASK" else 0.0
+    opacity = {"BLEND": factor, "MASK": float(factor >= cutoff)}.get(mode, 1.0)
+    tested = mode == "MASK" and opacity and factor > 0
+    return {
+        "opacity": opacity,
+        "ignores_alpha": mode not in ("MASK", "BLEND"),
+        # The cutoff of a texel, because the factor's alpha scales all texels.
+        "cutoff": max(cutoff / factor, 0.0) if tested else None,
+    }
+
+
 def _share(value: Any) -> float:
     """A number, clipped to [0, 1]; ValueError for other values."""
     return min(finite(value), 1.0)
@@ -282,7 +300,7 @@ def _finite(value: Any) -> float:
     return float(value)
 
 
-def _placing(use: dict[str, Any]) -> tuple[str, NDArray[np.float64], bool]:
+def _placement(use: dict[str, Any]) -> tuple[str, NDArray[np.float64], bool]:
     """The attribute with the coordinates of a texture, their (2, 3) matrix, and whether the
     material defines that."""
     transform = use.get("extensions", {}).get("KHR_texture_transform", {})

@@ -27,7 +27,7 @@ from ptmtools.scene.gltf.document import (
     FAULTS,
     GltfDocument,
     check_extensions,
-    damaged,
+    damage,
     document_json,
     fault_of,
     open_document,
@@ -85,7 +85,7 @@ def read_gltf(
     except InputError:
         raise
     except FAULTS as error:
-        raise damaged(path, fault_of(error)) from None
+        raise damage(path, fault_of(error)) from None
 
 
 #: The textures of a second reading.
@@ -123,14 +123,14 @@ def _read(
     check_extensions(tree, notes)
     world_of = world_matrices(tree, notes)
     every = (draw for node in world_of for draw in _draws(document, node, notes))
-    draws = list(_limited(document, every, max_triangles))
+    draws = list(_count_triangles(document, every, max_triangles))
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with triangles")
     uses = [
         materials.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes)
         for draw in draws
     ]
-    compressed = [_compressed(document, draw) for draw in draws]
+    compressed = [_draco_of(document, draw) for draw in draws]
     decoded = decode_primitives(document, (c["bufferView"] for c in compressed if c is not None))
     arrays, first, step = MeshArrays(), dict[int, int](), 0.0
     grids: dict[tuple[bool, int], float] = {}
@@ -142,15 +142,15 @@ def _read(
             if use.normal_coords is not None and use.normal_matrix is not None:
                 count = len(points)
                 place = use.normal_coords, use.normal_matrix
-                own = _coordinates(values, *place, count, optional=True)
-                normal_uv = own[triangles]
+                normal_coords = _coordinates(values, *place, count, optional=True)
+                normal_uv = normal_coords[triangles]
             placed = instances(document, draw.node)
             key = (True, draco["bufferView"]) if draco else (False, draw.attributes["POSITION"])
             if key not in grids:
                 grids[key] = values.step("POSITION")
             grid = grids[key]
         except ValueError as error:
-            raise damaged(path, str(error), draw.place) from None
+            raise damage(path, str(error), draw.place) from None
         if draw.node not in first:
             first[draw.node] = arrays.add_objects(draw.name, draw.instances)
         with np.errstate(all="ignore"):
@@ -197,33 +197,35 @@ def _draws(document: GltfDocument, node: int, notes: IngestNotes) -> Iterator[_D
         yield _Draw(node, name, primitive, place, count)
 
 
-def _limited(document: GltfDocument, draws: Iterable[_Draw], max_triangles: int) -> Iterator[_Draw]:
+def _count_triangles(
+    document: GltfDocument, draws: Iterable[_Draw], max_triangles: int
+) -> Iterator[_Draw]:
     """The same primitives with their counts of triangles. Raises LimitError PTM-L203."""
-    most = min(MAX_VERTICES, _VERTICES_PER_TRIANGLE * max_triangles)
+    limit = min(MAX_VERTICES, _VERTICES_PER_TRIANGLE * max_triangles)
     vertices = triangles = 0
     for draw in draws:
         accessors = document.tree["accessors"]
         points = corners = natural(accessors[draw.attributes["POSITION"]]["count"])
         if "indices" in draw.primitive:
             corners = natural(accessors[draw.primitive["indices"]]["count"])
-        each = max(1, corners // 3 if draw.mode == _TRIANGLES else corners)
+        bound = max(1, corners // 3 if draw.mode == _TRIANGLES else corners)
         if DRACO in draw.primitive.get("extensions", {}) and "indices" not in draw.primitive:
-            each = max(1, 2 * points)  # the stream has the indices; Euler's bound of a surface
+            bound = max(1, 2 * points)  # the stream has the indices; Euler's bound of a surface
         vertices += points * draw.instances
-        triangles += each * draw.instances
+        triangles += bound * draw.instances
         if triangles > max_triangles:
             raise too_many_triangles(max_triangles, document.path)
-        if vertices > most:
+        if vertices > limit:
             raise LimitError(
                 "PTM-L203",
-                f"more than {most} vertices, shared ones counted for each primitive",
+                f"more than {limit} vertices, shared ones counted for each primitive",
                 file=document.path,
                 remedy="raise the limit (--max-triangles), or split the model",
             )
-        yield replace(draw, triangles=each)
+        yield replace(draw, triangles=bound)
 
 
-def _compressed(document: GltfDocument, draw: _Draw) -> dict[str, Any] | None:
+def _draco_of(document: GltfDocument, draw: _Draw) -> dict[str, Any] | None:
     """The Draco extension of a primitive, unless it also has uncompressed data."""
     draco: dict[str, Any] | None = draw.primitive.get("extensions", {}).get(DRACO)
     plain = "bufferView" in document.tree["accessors"][draw.attributes["POSITION"]]

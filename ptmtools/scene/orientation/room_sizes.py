@@ -91,9 +91,9 @@ class RoomSizes:
     def storey(self) -> tuple[float, float]:
         """The clear height of most rooms, and the share of rooms that have it; 0 without rooms."""
         heights = self.heights
-        equal = [sum(h <= other <= h * (1 + _SAME) for other in heights) for h in heights]
-        most = max(range(len(heights)), key=lambda k: equal[k] * heights[k], default=-1)
-        return (heights[most], equal[most] / len(heights)) if heights else (0.0, 0.0)
+        equal = [sum(h <= height <= h * (1 + _SAME) for height in heights) for h in heights]
+        usual = max(range(len(heights)), key=lambda k: equal[k] * heights[k], default=-1)
+        return (heights[usual], equal[usual] / len(heights)) if heights else (0.0, 0.0)
 
     def share(self, height: float) -> float:
         """The share of places at which a visitor of this height fits; 1 without rooms."""
@@ -103,7 +103,8 @@ class RoomSizes:
     def times(self, scale: float) -> RoomSizes:
         """The same in units ``scale`` times as small."""
         return RoomSizes(
-            *(tuple(height * scale for height in each) for each in (self.visitors, self.heights))
+            tuple(height * scale for height in self.visitors),
+            tuple(height * scale for height in self.heights),
         )
 
 

@@ -208,8 +208,8 @@ def _judge_axis(ranked: list[Candidate], by_format: Up | None, notes: IngestNote
     return best.up
 
 
-def _reasons(candidate: Candidate, other: Candidate) -> str:
-    reasons = candidate.reasons(other)[:_REASONS]
+def _reasons(candidate: Candidate, rival: Candidate) -> str:
+    reasons = candidate.reasons(rival)[:_REASONS]
     return f" (reasons: {', '.join(reasons)})" if reasons else ""
 
 

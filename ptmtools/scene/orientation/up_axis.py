@@ -177,7 +177,7 @@ def evidence(
                 lines,
                 crossings,
                 np.abs(normals[axis][:, axis]) > _LEVEL,
-                [np.abs(each[:, axis]) < _UPRIGHT for each in normals],
+                [np.abs(unit[:, axis]) < _UPRIGHT for unit in normals],
                 axis,
             ).times(scale),
         )
@@ -231,9 +231,9 @@ def _free_height(crossings: Crossings, height: float) -> tuple[float, float, flo
     total = np.concatenate([[0.0], np.cumsum(gaps)])
     end = np.searchsorted(gaps, gaps * (1 + _SAME), "right")
     space = total[end] - total[:-1]
-    most = int(space.argmax())
+    widest = int(space.argmax())
     median = gaps[np.searchsorted(total[1:], total[-1] / 2)]
-    room, share = space[most] / (end[most] - most), space[most] / (lines * height)
+    room, share = space[widest] / (end[widest] - widest), space[widest] / (lines * height)
     return float(room), float(share), float(median)
 
 
@@ -340,9 +340,9 @@ class Candidate:
         """Whether its cost is low enough to print it as the second-best guess."""
         return self.cost <= RUNNER_UP * best.cost
 
-    def reasons(self, other: Candidate) -> list[str]:
-        """The criteria that favour this candidate over the other, the strongest first."""
-        gain = {name: other.costs[name] - cost for name, cost in self.costs.items()}
+    def reasons(self, rival: Candidate) -> list[str]:
+        """The criteria that favour this candidate over the rival, the strongest first."""
+        gain = {name: rival.costs[name] - cost for name, cost in self.costs.items()}
         return sorted(
             (name for name in gain if gain[name] >= _REASON), key=lambda name: -gain[name]
         )
@@ -361,16 +361,16 @@ def candidates(
     names = {length: name for name, length in UNITS.items()}
     units = UNITS if metres is None else {names.get(metres, f"{metres:g}"): metres}
     result = []
-    for up, one in measured.items():
-        extra = {f"{length:g}": length for length in _fitting_units(one) if numbers}
+    for up, sides in measured.items():
+        extra = {f"{length:g}": length for length in _fitting_units(sides) if numbers}
         for unit, length in (units | extra).items():
-            costs = _costs(one, measured[_OTHER[up]], length)
+            costs = _costs(sides, measured[_OTHER[up]], length)
             if metres is None:
                 # Says nothing on the axis: that with no rooms has no rooms that are too low.
-                costs["room for a visitor"] = _visitor_cost(one.rooms, length)
+                costs["room for a visitor"] = _visitor_cost(sides.rooms, length)
                 costs["usual unit"] = PRIOR.get(unit, NUMBER)
             costs[CONVENTION] = UNUSUAL_UP * (usual not in (None, up))
-            result.append(Candidate(up, length, unit, one, costs))
+            result.append(Candidate(up, length, unit, sides, costs))
     # Rounded, so that the last digits of coordinates decide nothing between equals.
     return sorted(result, key=lambda candidate: round(candidate.cost, 6))
 
@@ -388,13 +388,13 @@ def _fitting_units(measured: Evidence) -> list[float]:
     ]
 
 
-def _costs(measured: Evidence, other: Evidence, metres: float) -> dict[str, float]:
-    level = measured.level + other.level
+def _costs(measured: Evidence, lying: Evidence, metres: float) -> dict[str, float]:
+    level = measured.level + lying.level
     # Without free heights along both axes there are no rooms to compare.
-    rooms = _higher(measured.median, other.median) if measured.room and other.room else 0.5
+    rooms = _higher(measured.median, lying.median) if measured.room and lying.room else 0.5
     return {
         "more level faces": 1 - measured.level / level if level else 0.5,
-        "building wider than high": 0.75 * _higher(measured.height, other.height),
+        "building wider than high": 0.75 * _higher(measured.height, lying.height),
         "rooms wider than high": 1.5 * rooms,
         "walls in two directions": 1.5 * (1 - measured.crossed),
         "fewer sloping faces": 1 - measured.upright,
@@ -406,11 +406,11 @@ def _costs(measured: Evidence, other: Evidence, metres: float) -> dict[str, floa
     }
 
 
-def _higher(height: float, other: float) -> float:
+def _higher(height: float, reference: float) -> float:
     """How far one length exceeds another: 1 from a factor of 4 on, 0 from 1/4 down."""
-    if not height > 0 or not other > 0:
-        return 0.5 + ((height > 0) - (other > 0)) / 2
-    return 0.5 + max(-2.0, min(2.0, _log_ratio(height, other) / math.log(2))) / 4
+    if not height > 0 or not reference > 0:
+        return 0.5 + ((height > 0) - (reference > 0)) / 2
+    return 0.5 + max(-2.0, min(2.0, _log_ratio(height, reference) / math.log(2))) / 4
 
 
 def _size_cost(measured: Evidence, metres: float) -> float:

@@ -42,7 +42,7 @@ def open_stage(path: Path, notes: IngestNotes) -> tuple[Any, list[str]]:
     files: dict[str, None] = {}
     absent: dict[str, tuple[str, str]] = {}
     with Ar.ResolverContextBinder(context):
-        layers = _gathered(layer, files, absent, notes)
+        layers = _gather_layers(layer, files, absent, notes)
         try:
             stage = Usd.Stage.Open(layer, None, context)  # without a session
         except Tf.ErrorException as error:
@@ -61,7 +61,7 @@ def used_files(stage: Any, path: Path, notes: IngestNotes) -> dict[str, None]:
     files: dict[str, None] = {}
     for used in stage.GetUsedLayers(includeClipLayers=True):
         if not used.anonymous:
-            files[_inside(file_of(used.realPath), notes)] = None
+            files[_relative_name(file_of(used.realPath), notes)] = None
     files.pop(path.name, None)
     return files
 
@@ -109,7 +109,7 @@ def _layer(identifier: str, file: Path) -> Any:
     return layer
 
 
-def _gathered(
+def _gather_layers(
     root: Any, files: dict[str, None], absent: dict[str, tuple[str, str]], notes: IngestNotes
 ) -> list[Any]:
     """All layers that are reachable from the root, in all variants. Adds the missing ones to
@@ -130,12 +130,12 @@ def _gathered(
                 absent[identifier] = name, place
                 continue
             file = file_of(resolved)
-            _inside(file, notes, name)
+            _relative_name(file, notes, name)
             layers.append(_layer(identifier, file))
     return layers
 
 
-def _inside(file: Path, notes: IngestNotes, name: str = "") -> str:
+def _relative_name(file: Path, notes: IngestNotes, name: str = "") -> str:
     """The file relative to the model's folder. Raises InputError PTM-I205 if it is not allowed."""
     folder = notes.folder
     if not folder.allow_outside and not file.resolve().is_relative_to(folder.root.resolve()):

@@ -67,7 +67,7 @@ def tint(linear: Any) -> Color:
 
 def _glow(shader: Any) -> float:
     """The linear luminance that a shader emits; images have no effect."""
-    emitted = np.array(_numbers(_resolved(shader.GetInput("emissiveColor"))[0], _ZEROS)[:3])
+    emitted = np.array(_numbers(_resolve(shader.GetInput("emissiveColor"))[0], _ZEROS)[:3])
     return float(luminance(np.maximum(emitted, 0.0)))
 
 
@@ -95,18 +95,18 @@ class UsdMaterialReader:
         opacity, varies, from_image = self._opacity(shader, name, place)
         see_through = varies or from_image is not None
         plain = SourceMaterial(name, opacity=opacity, see_through=see_through, glow=_glow(shader))
-        value, source, output = _resolved(shader.GetInput("diffuseColor"))
+        value, source, output = _resolve(shader.GetInput("diffuseColor"))
         if source is None:
             self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
             return UsdSurface(replace(plain, color=tint(_numbers(value, _DIFFUSE))))
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
-            colors = str(_resolved(source.GetInput("varname"))[0] or "")
+            colors = str(_resolve(source.GetInput("varname"))[0] or "")
             return UsdSurface(replace(plain, color=_WHITE), colors=colors)
         if kind != "UsdUVTexture":
             self._notes.miss("PTM-N214", f"{name}: colours of {kind} ignored", place)
             return UsdSurface(plain)
-        file = _resolved(source.GetInput("file"))[0]
+        file = _resolve(source.GetInput("file"))[0]
         own_alpha = from_image == (_path_of(file), "a")
         if own_alpha:
             plain = replace(plain, see_through=varies)
@@ -126,14 +126,14 @@ class UsdMaterialReader:
         """The opacity; whether it varies or is tested, other than by the colour's image; and the
         path and output of an image of opacities."""
         threshold = _threshold(shader)
-        value, source, output = _resolved(shader.GetInput("opacity"))
+        value, source, output = _resolve(shader.GetInput("opacity"))
         if source is None:
             opacity = min(max(_number(value, 1.0), 0.0), 1.0)
             if threshold > 0:  # alpha testing
                 opacity = float(opacity >= threshold)
             return opacity, False, None
         if source.GetIdAttr().Get(TIME) == "UsdUVTexture":
-            return 1.0, threshold > 0, (_path_of(_resolved(source.GetInput("file"))[0]), output)
+            return 1.0, threshold > 0, (_path_of(_resolve(source.GetInput("file"))[0]), output)
         message = f"{name}: opacity ignored, the material is transparent"
         self._notes.note("PTM-N215", message, place)
         return 1.0, True, None
@@ -146,14 +146,14 @@ class UsdMaterialReader:
         if "<UDIM>" in path:
             self._notes.miss("PTM-N214", f"{path}: UDIM tiles ignored", place)
             return None
-        scale = _numbers(_resolved(texture.GetInput("scale"))[0], _ONES)
-        bias = _numbers(_resolved(texture.GetInput("bias"))[0], _ZEROS)
+        scale = _numbers(_resolve(texture.GetInput("scale"))[0], _ONES)
+        bias = _numbers(_resolve(texture.GetInput("bias"))[0], _ZEROS)
         if scale != _ONES or bias != _ZEROS:
             self._notes.note("PTM-N215", f"{path}: scale and bias ignored", place)
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
-        return self._named(file, place, wrap_s, wrap_t)
+        return self._named_image(file, place, wrap_s, wrap_t)
 
-    def _named(
+    def _named_image(
         self, file: Any, place: str, wrap_s: SourceWrap, wrap_t: SourceWrap
     ) -> NamedImage | None:
         """An image of a separate file, relative to the model's folder, or of a package."""
@@ -179,12 +179,13 @@ class UsdMaterialReader:
                 return None
             offset, length = offset + info.dataOffset, info.size
             container, rest = Ar.JoinPackageRelativePath([container, entry]), nested
-        other = "" if Path(package) == self._model else os.path.relpath(package, folder)
-        other = Path(other).as_posix() if other else ""
-        return NamedImage(inner, place, wrap_s, wrap_t, offset, length, other)
+        outer = ""
+        if Path(package) != self._model:
+            outer = Path(os.path.relpath(package, folder)).as_posix()
+        return NamedImage(inner, place, wrap_s, wrap_t, offset, length, outer)
 
     def _wrap(self, texture: Any, key: str, path: str, place: str) -> SourceWrap:
-        mode = str(_resolved(texture.GetInput(key))[0] or "useMetadata")
+        mode = str(_resolve(texture.GetInput(key))[0] or "useMetadata")
         if mode not in _WRAPS:  # useMetadata without metadata is black, too
             self._notes.note("PTM-N215", f"{path}: wrap mode black becomes clamp", place)
         return _WRAPS.get(mode, "clamp")
@@ -194,26 +195,26 @@ class UsdMaterialReader:
     ) -> tuple[str, tuple[tuple[float, float, float], ...]]:
         """The primvar with a texture's coordinates, and their (2, 3) transformation."""
         matrix, transformed = np.eye(3), False
-        source = _resolved(texture.GetInput("st"))[1]
+        source = _resolve(texture.GetInput("st"))[1]
         for _ in range(_DEEPEST):
             if source is None or source.GetIdAttr().Get(TIME) != "UsdTransform2d":
                 break
             matrix, transformed = matrix @ _transform(source), True
-            source = _resolved(source.GetInput("in"))[1]
+            source = _resolve(source.GetInput("in"))[1]
         if transformed:
             self._notes.note("PTM-N215", f"{name}: UsdTransform2d baked into its faces", place)
         coords = ""
         if source is not None and source.GetIdAttr().Get(TIME) == "UsdPrimvarReader_float2":
-            coords = str(_resolved(source.GetInput("varname"))[0] or "")
+            coords = str(_resolve(source.GetInput("varname"))[0] or "")
         return coords, tuple((a, b, c) for a, b, c in matrix[:2].tolist())
 
 
 def _threshold(shader: Any) -> float:
     """The opacity below which texels are not drawn; 0 if they are blended."""
-    return _number(_resolved(shader.GetInput("opacityThreshold"))[0], 0.0)
+    return _number(_resolve(shader.GetInput("opacityThreshold"))[0], 0.0)
 
 
-def _resolved(source: Any) -> tuple[Any, Any, str]:
+def _resolve(source: Any) -> tuple[Any, Any, str]:
     """The value of an input of a shader, or the shader and output that it is connected to."""
     if not source:
         return None, None, ""
@@ -248,10 +249,10 @@ def _path_of(file: Any) -> str:
 
 def _transform(shader: Any) -> Floats:
     """(3, 3) of UsdTransform2d: scale, then rotation, counter-clockwise, then translation."""
-    angle = math.radians(_number(_resolved(shader.GetInput("rotation"))[0], 0.0))
+    angle = math.radians(_number(_resolve(shader.GetInput("rotation"))[0], 0.0))
     c, s = math.cos(angle), math.sin(angle)
-    sx, sy = _numbers(_resolved(shader.GetInput("scale"))[0], (1.0, 1.0))
-    tx, ty = _numbers(_resolved(shader.GetInput("translation"))[0], (0.0, 0.0))
+    sx, sy = _numbers(_resolve(shader.GetInput("scale"))[0], (1.0, 1.0))
+    tx, ty = _numbers(_resolve(shader.GetInput("translation"))[0], (0.0, 0.0))
     return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0.0, 0.0, 1.0]])
 
 
@@ -288,15 +289,15 @@ class UsdPainter:
             faces = index == number
             if not faces.any():
                 continue
-            entry, image, own = self._material(prim, shape, key, surface, two_sided)
+            entry, image, corners = self._material(prim, shape, key, surface, two_sided)
             material[faces] = self._number.setdefault((entry, image), len(self._number))
             if image is not None:
                 assert surface is not None
                 uv[faces] = self._coordinates(prim, shape, key, surface)[faces]
-            if own is not None:
+            if corners is not None:
                 if colors is None:
                     colors = np.full((len(index), 3, 3), 255, dtype=np.uint8)
-                colors[faces] = own[faces]
+                colors[faces] = corners[faces]
         return material, uv, colors
 
     def _bound(self, prim: Any, shape: UsdMesh) -> tuple[list[UsdSurface | None], Ints]:
@@ -310,8 +311,8 @@ class UsdPainter:
             UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, purpose)[0]
             for purpose in (UsdShade.Tokens.preview, UsdShade.Tokens.full)
         )
-        for material, other in zip(materials, full, strict=True):
-            bound = material or other
+        for material, fallback in zip(materials, full, strict=True):
+            bound = material or fallback
             surfaces.append(self._reader.read(bound) if bound else None)
         for number, subset in enumerate(subsets, start=1):
             index = array(subset.GetIndicesAttr().Get(TIME), np.int64)

@@ -105,7 +105,7 @@ def cut(prim: Any, notes: IngestNotes, model: Path) -> UsdMesh:
     place = str(prim.GetPath())
     points, counts, vertex = _faces(prim)
     if (counts < 0).any() or counts.sum() != len(vertex):
-        raise inconsistent(
+        raise inconsistency(
             model, place, f"faces of {counts.sum()} corners, but {len(vertex)} indices"
         )
     if len(vertex) and not 0 <= vertex.min() <= vertex.max() < len(points):
@@ -138,7 +138,7 @@ def cut(prim: Any, notes: IngestNotes, model: Path) -> UsdMesh:
     )
 
 
-def inconsistent(model: Path, place: str, reason: str) -> InputError:
+def inconsistency(model: Path, place: str, reason: str) -> InputError:
     """The error for inconsistent arrays, PTM-I254."""
     remedy = "the file may be damaged, export it again"
     return InputError("PTM-I254", reason, file=model, place=place, remedy=remedy)

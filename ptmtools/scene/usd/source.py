@@ -35,7 +35,7 @@ from ptmtools.scene.usd.layers import (
     used_files,
 )
 from ptmtools.scene.usd.material import UsdMaterialReader, UsdPainter, key_of
-from ptmtools.scene.usd.mesh import UsdMesh, array, cut, inconsistent, is_cut, triangles_of
+from ptmtools.scene.usd.mesh import UsdMesh, array, cut, inconsistency, is_cut, triangles_of
 
 _HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
@@ -49,7 +49,7 @@ class Group:
     triangles: int = 0
     places: int = 0
 
-    def placed(self, frames: Floats, prefix: str = "") -> Iterator[tuple[Any, str, Floats]]:
+    def place_meshes(self, frames: Floats, prefix: str = "") -> Iterator[tuple[Any, str, Floats]]:
         """The prims of the group's meshes, an instance proxy within an instance; their names, see
         `Traversal`; and (k, 4, 4) local to world of each instance, for row vectors.
 
@@ -57,14 +57,14 @@ class Group:
         """
         for name, matrix, part in self.parts:
             with np.errstate(all="ignore"):
-                own = matrix @ frames
+                world = matrix @ frames
             if not isinstance(part, list):
-                yield part, prefix + name, own
+                yield part, prefix + name, world
                 continue
             for group, instances in part:
                 with np.errstate(all="ignore"):
-                    nested = (instances[None] @ own[:, None]).reshape(-1, 4, 4)
-                yield from group.placed(nested, f"{prefix}{name}/")
+                    nested = (instances[None] @ world[:, None]).reshape(-1, 4, 4)
+                yield from group.place_meshes(nested, f"{prefix}{name}/")
 
 
 class Traversal:
@@ -162,7 +162,7 @@ class Traversal:
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         positions = array(instancer.GetPositionsAttr().Get(TIME), np.float64, 3)
         if not 0 <= index.min() <= index.max() < len(targets) or len(positions) != len(index):
-            raise inconsistent(self._model, place, "inconsistent arrays of the instancer")
+            raise inconsistency(self._model, place, "inconsistent arrays of the instancer")
         frames = instancer.ComputeInstanceTransformsAtTime(
             TIME,
             TIME,
@@ -171,7 +171,7 @@ class Traversal:
         )
         frames = array(frames, np.float64, 4, 4)
         if len(frames) != len(index):
-            raise inconsistent(self._model, place, "inconsistent arrays of the instancer")
+            raise inconsistency(self._model, place, "inconsistent arrays of the instancer")
         mask = instancer.ComputeMaskAtTime(TIME)
         visible = np.array(mask, dtype=bool) if mask else np.ones(len(index), dtype=bool)
         if hidden := int((~visible).sum()):
@@ -216,31 +216,31 @@ def _surfaces(prim: Any, predicate: Any) -> int:
 
 
 def make_source(
-    path: Path, notes: IngestNotes, most: int
+    path: Path, notes: IngestNotes, limit: int
 ) -> tuple[ModelSource, dict[int, NamedImage], list[str]]:
     """The model without textures; the images of its materials by number; and the names of its
     files. Raises the errors of `ptmtools.scene.usd.reader.read_usd`.
     """
     try:
-        return _make(path, notes, most)
+        return _make(path, notes, limit)
     except Tf.ErrorException as error:  # damage that is detected when a value is read
         raise unreadable(LIBRARY, path, reason(error)) from None
 
 
 def _make(
-    path: Path, notes: IngestNotes, most: int
+    path: Path, notes: IngestNotes, limit: int
 ) -> tuple[ModelSource, dict[int, NamedImage], list[str]]:
     stage, files = open_stage(path, notes)
     traversal = Traversal(stage, notes, path)
     group = traversal.group()
-    if group.triangles > most or group.places > most:
-        raise too_many_triangles(most, path)
+    if group.triangles > limit or group.places > limit:
+        raise too_many_triangles(limit, path)
     if not group.triangles:
         raise InputError("PTM-I247", "no faces", file=path, remedy="use a model with meshes")
     painter = UsdPainter(UsdMaterialReader(notes, path), notes)
     shapes: dict[str, UsdMesh] = {}
     arrays = MeshArrays()
-    for prim, name, frames in group.placed(np.eye(4)[None]):
+    for prim, name, frames in group.place_meshes(np.eye(4)[None]):
         key = key_of(prim)
         if key not in shapes:
             shapes[key] = cut(prim, notes, path)
