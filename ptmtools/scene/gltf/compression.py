@@ -37,7 +37,7 @@ _WIDTH_ULPS = 4
 
 
 @dataclass(frozen=True)
-class DracoMesh:
+class DracoPrimitive:
     """A decoded primitive.
 
     Attributes
@@ -77,7 +77,7 @@ class DracoMesh:
         return 0.0
 
 
-def decode_primitives(document: GltfDocument, views: Iterable[int]) -> dict[int, DracoMesh]:
+def decode_primitives(document: GltfDocument, views: Iterable[int]) -> dict[int, DracoPrimitive]:
     """The primitives in these buffer views.
 
     Raises ValueError for a view that exceeds its buffer, InputError PTM-I254 if one cannot be
@@ -100,7 +100,7 @@ def decode_primitives(document: GltfDocument, views: Iterable[int]) -> dict[int,
             triangles = arrays.pop("triangles").astype(np.int64)
             attributes = {int(name.removeprefix("id_")): array for name, array in arrays.items()}
             data = Path(scratch, f"{k}.drc").read_bytes()
-            primitives[view] = DracoMesh(triangles, attributes, data)
+            primitives[view] = DracoPrimitive(triangles, attributes, data)
     return primitives
 
 

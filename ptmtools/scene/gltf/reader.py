@@ -22,7 +22,7 @@ from ptmtools.glb import COMPONENTS, meaning, natural
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import encoded
 from ptmtools.scene.formats import MAX_VERTICES, Purpose, too_many_triangles
-from ptmtools.scene.gltf.compression import DRACO, DracoMesh, decode_primitives
+from ptmtools.scene.gltf.compression import DRACO, DracoPrimitive, decode_primitives
 from ptmtools.scene.gltf.document import (
     FAULTS,
     GltfDocument,
@@ -240,7 +240,7 @@ class _Values:
         document: GltfDocument,
         draw: _Draw,
         draco: dict[str, Any] | None,
-        decoded: dict[int, DracoMesh],
+        decoded: dict[int, DracoPrimitive],
     ) -> None:
         self._document, self._draw = document, draw
         self._ids = {} if draco is None else draco["attributes"]

@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings, strategies as st
 
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
-from ptmtools.scene.gltf.compression import DracoMesh
+from ptmtools.scene.gltf.compression import DracoPrimitive
 from ptmtools.tolerance import COARSEST
 from tests.scene.conftest import GltfModel, Put
 
@@ -24,14 +24,14 @@ def _draco(require: Callable[[str, str], None]) -> None:
         require("DracoPy", "pip install DracoPy")
 
 
-def decoded(points: np.ndarray, bits: int) -> tuple[DracoMesh, int]:
+def decoded(points: np.ndarray, bits: int) -> tuple[DracoPrimitive, int]:
     import DracoPy
 
     faces = np.arange(len(points) // 3 * 3, dtype=np.uint32).reshape(-1, 3)
     data = DracoPy.encode(points, faces, quantization_bits=bits)
     rows = DracoPy.decode(data).attributes
     attributes = {row["unique_id"]: row["data"] for row in rows}
-    return DracoMesh(faces.astype(np.int64), attributes, data), rows[0]["unique_id"]
+    return DracoPrimitive(faces.astype(np.int64), attributes, data), rows[0]["unique_id"]
 
 
 @settings(max_examples=60)
@@ -61,9 +61,9 @@ def test_the_step_is_the_encoders(seed: int) -> None:
 def test_what_is_not_known_is_0() -> None:
     actual, attribute = decoded(np.random.default_rng(1).random((9, 3)), 14)
     assert actual.step(attribute + 99) == 0
-    assert DracoMesh(actual.triangles, actual.attributes, b"").step(attribute) == 0
+    assert DracoPrimitive(actual.triangles, actual.attributes, b"").step(attribute) == 0
     whole = {attribute: actual.attributes[attribute].astype(np.int16)}
-    assert DracoMesh(actual.triangles, whole, actual.data).step(attribute) is None
+    assert DracoPrimitive(actual.triangles, whole, actual.data).step(attribute) is None
 
 
 def blocks(scale: float) -> GltfModel:
@@ -127,10 +127,10 @@ def test_draco_without_indices_has_its_own(put: Put) -> None:
 def test_zeros_without_end_are_searched_no_further(put: Put) -> None:
     """A mark of zeros is found at every byte."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], np.float32)
-    stream = DracoMesh(np.zeros((0, 3), np.int64), {0: points}, bytes(1 << 20))
+    stream = DracoPrimitive(np.zeros((0, 3), np.int64), {0: points}, bytes(1 << 20))
     assert stream.step(0) == 0
     huge = np.array([[-3e38] * 3, [3e38] * 3], np.float32)
-    assert DracoMesh(np.zeros((0, 3), np.int64), {0: huge}, bytes(100)).step(0) == 0
+    assert DracoPrimitive(np.zeros((0, 3), np.int64), {0: huge}, bytes(100)).step(0) == 0
 
 
 def test_draco_of_a_strip_has_triangles(put: Put) -> None:
