@@ -45,7 +45,7 @@ from ptmtools.cells.roles import matches
 from ptmtools.cells.rooms import grouped
 from ptmtools.cells.sight import seen_from_places
 from ptmtools.cells.space import Space, divide, divide_inside
-from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
+from ptmtools.cells.structure import LOOKS, Structure, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.executor import Executor
@@ -78,68 +78,93 @@ def subdivide(
         if a name pattern matches nothing, PTM-I247 if the scene is a single triangle, PTM-I304 if
         no face would be visible, PTM-I305 if much is left out under ``strict``.
     """
-    options = options or SubdivideOptions()
+    options, executor = options or SubdivideOptions(), executor or Executor()
     _check(scene, options)
     with counting() as undecided:
-        cells = _subdivided(scene, options, progress, executor or Executor())
+        building = Building.of(scene, options, executor)
+        space, notes = _divide_scene(scene, building, progress, executor)
+        cells = _cut_and_group(scene, building, space, notes, executor)
     check_seen(scene, cells)
     return replace(cells, notes=(*cells.notes, *undecided_notes(undecided)))
 
 
-def _subdivided(
-    scene: Scene, options: SubdivideOptions, progress: Progress, executor: Executor
-) -> Cells:
-    axes = main_axes(scene.corners)
-    building = Building.of(scene, options, executor)
-    corners, tolerance = building.structure.corners, building.structure.tolerance
-    low, high = bounds(scene.corners @ axes.T)
-    margin = BOX_MARGIN * tolerance.extent
-    wide = Polyhedron.box(low - margin, high + margin)
-    wide = replace(wide, points=wide.points @ axes)
-    tight = _thickened(*bounds(corners if len(corners) else scene.corners), tolerance)
+def _divide_scene(
+    scene: Scene, building: Building, progress: Progress, executor: Executor
+) -> tuple[Space, list[str]]:
+    """The divided space of a scene, the first root box if that is closed, else the second; and
+    notes on it."""
+    wide, tight = _root_boxes(scene, building.structure)
     notes = [*detail_notes(scene, building.structure.detail), *building.volumes.notes]
     notes += facet_notes(building.facets)
     clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = divide(building, wide, progress)
         if not space.closed:
-            roofed = roofed_share(corners, options.wall_area)
-            outside = space
-            space = replace(clipped.result(), closed=False)
+            outside, space = space, replace(clipped.result(), closed=False)
+            roofed = roofed_share(building.structure.corners, building.options.wall_area)
             notes.append(_open_note(outside, roofed, tight, space.ceiling))
     finally:
         clipped.cancel()
-    limit, many = options.max_leaves, _passed(space) > MOST_PORTALS
-    while _passed(space) > MOST_PORTALS:
+    limit, many = building.options.max_leaves, _portal_count(space) > MOST_PORTALS
+    while _portal_count(space) > MOST_PORTALS:
         limit = len(space.tree.leaves) // 2
-        building = replace(building, options=replace(options, max_leaves=limit))
-        again = divide(building, wide) if space.closed else space
-        space = again if again.closed else replace(divide_inside(building, tight), closed=False)
-    opened = building.doors.triangles(space.doors)
+        fewer = replace(building, options=replace(building.options, max_leaves=limit))
+        again = divide(fewer, wide) if space.closed else space
+        space = again if again.closed else replace(divide_inside(fewer, tight), closed=False)
+    notes += _space_notes(scene, building, space)
+    if space.tree.unsplit:
+        notes.append(_limit_note(space.tree.unsplit, limit, many))
+    if space.tree.ended:
+        notes.append(
+            f"division ended at {len(space.tree.leaves):,} leaves: more would save visitors less "
+            f"than {building.options.gain:.0%}, since sight goes around the walls or over them "
+            "(--gain changes that)"
+        )
+    return space, notes
+
+
+def _root_boxes(scene: Scene, structure: Structure) -> tuple[Polyhedron, Floats]:
+    """A box along the main axes of a scene, wider than it, and (2, 3) the box around its walls,
+    which has a height in every direction: a mere floor still has one cell above it."""
+    axes, tolerance = main_axes(scene.corners), structure.tolerance
+    low, high = bounds(scene.corners @ axes.T)
+    margin = BOX_MARGIN * tolerance.extent
+    wide = Polyhedron.box(low - margin, high + margin)
+    low, high = bounds(structure.corners if len(structure.corners) else scene.corners)
+    tight = np.array([low, np.where(high - low < tolerance.thin, low + margin, high)])
+    return replace(wide, points=wide.points @ axes), tight
+
+
+def _space_notes(scene: Scene, building: Building, space: Space) -> list[str]:
+    """Notes on doors, and on space that cannot be reached."""
+    options, notes = building.options, []
     if options.doors != "closed":
         notes += door_notes(building.doors.leaves, space.doors, options.doors)
         if space.beyond.rooms or space.beyond.outside:
             notes += unrecognised_door_notes(scene, building.doors.leaves)
     notes += unreached_notes(space.beyond, options.reach == "all", space.place, options.strict)
-    if space.tree.unsplit:
-        kind = "leaves for visible sets" if many else "leaves"
-        remedy = "name furniture with --detail" if many else "raise --max-leaves"
-        notes.append(
-            Warned(
-                f"the limit of {limit:,} {kind} was reached: "
-                f"{space.tree.unsplit:,} of them contain walls that do not divide them, so the "
-                f"space behind these walls counts as visible; {remedy}"
-            )
-        )
-    if space.tree.ended:
-        notes.append(
-            f"division ended at {len(space.tree.leaves):,} leaves: more would save visitors less "
-            f"than {options.gain:.0%}, since sight goes around the walls or over them (--gain "
-            "changes that)"
-        )
+    return notes
+
+
+def _limit_note(unsplit: int, limit: int, many: bool) -> str:
+    """``many``: whether visible sets could not hold the portals of more leaves."""
+    kind = "leaves for visible sets" if many else "leaves"
+    remedy = "name furniture with --detail" if many else "raise --max-leaves"
+    return Warned(
+        f"the limit of {limit:,} {kind} was reached: {unsplit:,} of them contain walls that do not "
+        f"divide them, so the space behind these walls counts as visible; {remedy}"
+    )
+
+
+def _cut_and_group(
+    scene: Scene, building: Building, space: Space, notes: list[str], executor: Executor
+) -> Cells:
+    """The geometry of a scene cut to the leaves of a space, and these grouped into cells."""
+    options, tolerance = building.options, building.structure.tolerance
+    opened = building.doors.triangles(space.doors)
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     owner = compact_numbers(space.reached)[pieces.leaf]
-    cells = assembled(scene, building, space, pieces, owner, notes)
+    cells = assemble_cells(scene, building, space, pieces, owner, notes)
     name = np.append(compact_numbers(seen_from_places(cells, executor)), np.int32(-1))
     cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
     dropped = [*leaf_notes(cells, space.reached), *triangle_notes(scene, pieces, name[owner])]
@@ -151,7 +176,7 @@ def _subdivided(
     return replace(cells, **vars(joined(scene, pieces, owner, tolerance)), opened=opened)
 
 
-def _passed(space: Space) -> int:
+def _portal_count(space: Space) -> int:
     """The number of portals between reached leaves."""
     ends = np.array([portal.leaves for portal in space.portals], dtype=np.int64).reshape(-1, 2)
     return int(np.count_nonzero(space.reached[ends].all(axis=1)))
@@ -174,12 +199,6 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
-    """(2, 3) box with a height in every direction: a mere floor still has one cell above it."""
-    flat = high - low < tolerance.thin
-    return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
-
-
 def _open_note(space: Space, roofed: float, box: Floats, ceiling: float | None) -> str:
     if roofed < ROOFED:
         state = f"open at the top: {1 - roofed:.0%} of the floor has no ceiling"
@@ -197,7 +216,7 @@ def _open_note(space: Space, roofed: float, box: Floats, ceiling: float | None) 
     return Warned(note) if roofed < ROOFED else note
 
 
-def assembled(
+def assemble_cells(
     scene: Scene,
     building: Building,
     space: Space,
@@ -205,28 +224,16 @@ def assembled(
     owner: NDArray[np.int32],
     notes: list[str],
 ) -> Cells:
-    """Cells that are single leaves, with the pieces of the geometry as they were cut."""
-    tree = space.tree
-    keep = space.reached
+    """Cells that are single leaves, with the pieces of the geometry as they were cut; ``owner``:
+    (M, 2) the new numbers of the leaves on both sides of each piece."""
+    tree, keep = space.tree, space.reached
     rename = compact_numbers(keep)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
-    standing, eye_floor = _standing(building, bodies, space)
-    if not standing.any():
-        standing[:], eye_floor = True, eye_floor[:0]
-        notes = [*notes, NO_PLACES]
-    viewpoints, cameras = (
-        np.array(points, dtype=np.float64).reshape(-1, 3)
-        for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
-    )
-    leaf = _leaf_at(space, rename, viewpoints)
-    notes = [*notes, *viewpoint_notes(_buried(building, viewpoints, eye_floor))]
-    # Viewers stand at requested viewpoints, whatever the floor there.
-    leaf = np.append(leaf, _leaf_at(space, rename, cameras))
-    standing[leaf[leaf >= 0]] = True
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
     portals = sorted(portals, key=lambda portal: portal.passage)
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     passage = np.array([portal.passage for portal in portals], dtype=np.bool_)
+    standing, eye_floor, standing_notes = _viewers(scene, building, space, bodies, rename)
     # The inside of a door leaf is no place.
     standing &= ~_in_door_leaves(bodies, rename[ends[passage]], building.structure.tolerance)
     children = tree.children.copy()
@@ -269,8 +276,34 @@ def assembled(
         walker=building.walker,
         ceiling=space.ceiling,
         closed=space.closed,
-        notes=tuple(notes),
+        notes=(*notes, *standing_notes),
     )
+
+
+def _viewers(
+    scene: Scene,
+    building: Building,
+    space: Space,
+    bodies: list[Polyhedron],
+    rename: NDArray[np.int32],
+) -> tuple[Bools, Floats, list[str]]:
+    """(L,) which leaves stand, `Cells.eye_floor`, and notes; ``rename``: the new number of each
+    leaf of the tree."""
+    standing, eye_floor = _standing(building, bodies, space)
+    notes: list[str] = []
+    if not standing.any():
+        standing[:], eye_floor = True, eye_floor[:0]
+        notes.append(NO_PLACES)
+    viewpoints, cameras = (
+        np.array(points, dtype=np.float64).reshape(-1, 3)
+        for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
+    )
+    leaf = _leaf_at(space, rename, viewpoints)
+    notes += viewpoint_notes(_buried(building, viewpoints, eye_floor))
+    # Viewers stand at requested viewpoints, whatever the floor there.
+    leaf = np.append(leaf, _leaf_at(space, rename, cameras))
+    standing[leaf[leaf >= 0]] = True
+    return standing, eye_floor, notes
 
 
 def _in_door_leaves(
