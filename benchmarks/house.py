@@ -44,7 +44,7 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools": (66_470, 338),
     "ptmtools/*.py": (4_110, 26),
-    "ptmtools/cells": (7_990, 31),
+    "ptmtools/cells": (8_020, 31),
     "ptmtools/cli": (3_180, 14),
     "ptmtools/coverage": (2_510, 15),
     "ptmtools/light": (2_070, 11),

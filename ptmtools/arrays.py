@@ -34,21 +34,21 @@ def normals(corners: Floats) -> Floats:
 
 
 def polygon_planes(
-    here: Floats, following: Floats, start: Ints, thinnest: float
+    start_point: Floats, following: Floats, start: Ints, thinnest: float
 ) -> tuple[Floats, Bools]:
     """The planes of polygons, (k, 4) unit normals and offsets, and (k,) whether each is sound:
     thicker than ``thinnest``, metres. The normal of a sliver is arbitrary, and not of length 1.
 
-    ``here``, ``following``: (n, 3) ends of their edges; ``start``: (k,) the first of each.
+    ``start_point``, ``following``: (n, 3) ends of their edges; ``start``: (k,) the first of each.
     """
-    size = np.diff([*start, len(here)])
-    first = np.repeat(here[start], size, axis=0)
-    normal = np.add.reduceat(cross(here - first, following - first), start, axis=0)
-    longest = np.maximum.reduceat(np.linalg.norm(following - here, axis=1), start)
+    size = np.diff([*start, len(start_point)])
+    first = np.repeat(start_point[start], size, axis=0)
+    normal = np.add.reduceat(cross(start_point - first, following - first), start, axis=0)
+    longest = np.maximum.reduceat(np.linalg.norm(following - start_point, axis=1), start)
     twice_area = np.linalg.norm(normal, axis=1)
     sound = twice_area > 2 * thinnest * longest
     normal /= np.where(sound, twice_area, 1.0)[:, None]
-    middle = np.add.reduceat(here, start, axis=0) / size[:, None]
+    middle = np.add.reduceat(start_point, start, axis=0) / size[:, None]
     return np.column_stack([normal, -np.einsum("ij,ij->i", normal, middle)]), sound
 
 

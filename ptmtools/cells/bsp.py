@@ -268,15 +268,15 @@ def _fragments(before: list[_Fragment], whole: list[bool], tolerance: Tolerance)
     if not rows:
         return []
     flat = [before[i].wall.frame.to_plane(before[i].outline) for i in rows]
-    of = np.repeat(np.arange(len(flat)), [len(outline) for outline in flat])
-    regions = shapely.polygons(shapely.linearrings(np.concatenate(flat), indices=of))
+    owner = np.repeat(np.arange(len(flat)), [len(outline) for outline in flat])
+    regions = shapely.polygons(shapely.linearrings(np.concatenate(flat), indices=owner))
     sections = shapely.area(regions).tolist()
     some = np.array([not whole[i] for i in rows], dtype=np.bool_)
     shapes = np.array([before[i].shape for i in rows], dtype=object)
     shapes[some] = intersection(shapes[some], regions[some], tolerance.grid)
     areas = shapely.area(shapes)
-    corners, of = shapely.get_coordinates(shapes[some], return_index=True)
-    start = np.searchsorted(of, np.arange(np.count_nonzero(some) + 1))
+    corners, owner = shapely.get_coordinates(shapes[some], return_index=True)
+    start = np.searchsorted(owner, np.arange(np.count_nonzero(some) + 1))
     place = np.cumsum(some) - 1
     kept: list[_Fragment] = []
     for i in np.flatnonzero(areas > tolerance.rounding * tolerance.extent).tolist():
@@ -364,12 +364,12 @@ def _candidates(fragments: list[_Fragment]) -> Iterator[tuple[int, int]]:
     """Turns and the fragments, ascending, whose planes are compared in each: all in the first, or
     the largest of very many, and the others only if none of these splits."""
     count = len(fragments)
-    each = count if count * count <= _PAIRS else max(_FEW, _PAIRS // count)
+    batch = count if count * count <= _PAIRS else max(_FEW, _PAIRS // count)
     order = np.arange(count)
-    if each < count:
+    if batch < count:
         order = ranked(np.array([f.area for f in fragments]))
-    for turn, first in enumerate(range(0, count, each)):
-        for i in sorted(order[first : first + each].tolist()):
+    for turn, first in enumerate(range(0, count, batch)):
+        for i in sorted(order[first : first + batch].tolist()):
             yield turn, i
 
 

@@ -37,9 +37,9 @@ from ptmtools.cells.structure import (
     Structure,
     Surroundings,
     WallPlane,
-    built,
     find_walls,
     spread_over,
+    without_facets,
 )
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import Portals
@@ -61,22 +61,24 @@ class Viewing:
     @staticmethod
     def of(places: Places, middle: float, structure: Floats, tolerance: Tolerance) -> Viewing:
         """``middle``: height of the middle of a body; ``structure``: (n, 3, 3) triangles."""
-        points, area = _thinned(*spread(places.triangles(tolerance)))
-        beside = _beside(structure, 2 * tolerance.plane)
+        points, area = _thin(*spread(places.triangles(tolerance)))
+        beside = _points_beside(structure, 2 * tolerance.plane)
         return Viewing((points + [0.0, middle, 0.0], area), beside, tolerance)
 
     def cost(self, tree: Tree) -> float:
         """The mean share of all surfaces that a viewer sees from any point of a leaf, in a tree
         that may not be complete. Surfaces that no viewer sees do not count."""
-        viewers, surface = (_held(tree, *points) for points in (self.viewers, self.surfaces))
+        viewers, surface = (
+            _weight_by_leaf(tree, *points) for points in (self.viewers, self.surfaces)
+        )
         with counting():  # what is undecided here decides nothing
             sees = sampled_sight(_openings(tree, self.tolerance))
-        held, seen = 0.0, np.zeros(len(surface), dtype=np.bool_)
+        seen_share, seen = 0.0, np.zeros(len(surface), dtype=np.bool_)
         for leaf in np.flatnonzero(viewers):
-            held += viewers[leaf] * surface[sees[leaf]].sum()
+            seen_share += viewers[leaf] * surface[sees[leaf]].sum()
             seen |= sees[leaf]
-        most = viewers.sum() * surface[seen].sum()
-        return float(held / most) if most > 0 else 1.0
+        everything = viewers.sum() * surface[seen].sum()
+        return float(seen_share / everything) if everything > 0 else 1.0
 
 
 def _openings(tree: Tree, tolerance: Tolerance) -> Portals:
@@ -91,24 +93,24 @@ def _openings(tree: Tree, tolerance: Tolerance) -> Portals:
     )
 
 
-def _held(tree: Tree, points: Floats, weight: Floats) -> Floats:
+def _weight_by_leaf(tree: Tree, points: Floats, weight: Floats) -> Floats:
     """(L,) the weight of the points in each leaf."""
     leaf = -2 - descend(tree.planes, tree.children, points)
     return summed(leaf, weight, len(tree.leaves))
 
 
-def _beside(corners: Floats, distance: float) -> tuple[Floats, Floats]:
+def _points_beside(corners: Floats, distance: float) -> tuple[Floats, Floats]:
     """Points spread over triangles, half of them at a distance to either side, and their m²."""
     facing = normals(corners)
     length = np.linalg.norm(facing, axis=1)
     sound = length > 0
     step = distance * facing[sound] / length[sound, None]
-    sides = [_thinned(*spread(corners[sound] + turn * step[:, None])) for turn in (1.0, -1.0)]
+    sides = [_thin(*spread(corners[sound] + turn * step[:, None])) for turn in (1.0, -1.0)]
     points, area = zip(*sides, strict=True)
     return np.concatenate(points), np.concatenate(area) / 2
 
 
-def _thinned(points: Floats, weight: Floats) -> tuple[Floats, Floats]:
+def _thin(points: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """Some of the points, which represent them all."""
     step = -(-len(points) // _POINTS) or 1
     return points[::step], weight[::step] * step
@@ -142,7 +144,7 @@ class Building:
         structure = Structure.of(opaque, tolerance)
         doors, structure = Doors.recognise(scene, opaque, structure, options)
         every = find_walls(structure, options.wall_area)
-        walls = every if options.structural else built(every)
+        walls = every if options.structural else without_facets(every)
         reveals = Reveals(structure, options.wall_thickness)
         walker = Walker(*options.walker)
         detail = detail_of(scene, structure, options)

@@ -47,12 +47,12 @@ def clear_of(
     left, owner, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
     by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
     while len(region):
-        row, near = _about(corners, by_height, plan, slope, band, radius)
+        row, near = _pairs_near(corners, by_height, plan, slope, band, radius)
         crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
             longest(plan) > _SHORT * band[1]
         )
         some = ~crowded[row]
-        free = _less(plan, slope, corners[near[some]], row[some], band, radius, tolerance)
+        free = _subtract_near(plan, slope, corners[near[some]], row[some], band, radius, tolerance)
         kept = ~crowded & ~shapely.is_empty(free)
         left.append(free[kept])
         owner.append(region[kept])
@@ -61,7 +61,7 @@ def clear_of(
     return np.concatenate(left), np.concatenate(owner)
 
 
-def _about(
+def _pairs_near(
     corners: Floats,
     by_height: ByHeight,
     plan: Geometry,
@@ -93,7 +93,7 @@ def _about(
     return np.concatenate(rows), np.concatenate(hits)
 
 
-def _less(
+def _subtract_near(
     plan: Geometry,
     slope: Floats,
     corners: Floats,
@@ -124,7 +124,7 @@ def _less(
         each, shadow = shadows(corners[at][:, :, PLAN], height, band, at)
         # A radius away is not near, but for rounding.
         near = shapely.dwithin(shadow, left[row[each]], (1 - 1e-6) * radius)
-        shadow, target = _merged(shadow[near], row[each[near]], radius, tolerance)
+        shadow, target = _merge(shadow[near], row[each[near]], radius, tolerance)
         # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
         wide = buffer(shadow, radius, quad_segs=QUARTER)
         names, taken = united_by(target, wide, tolerance.grid)
@@ -133,7 +133,7 @@ def _less(
     return left
 
 
-def _merged(
+def _merge(
     shapes: Geometry, row: Ints, radius: float, tolerance: Tolerance
 ) -> tuple[Geometry, Ints]:
     """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Thin

@@ -36,7 +36,7 @@ def detail_notes(scene: Scene, detail: Ints) -> list[str]:
     if not len(detail):
         return []
     owners, size = np.unique(scene.triangle_object[detail], return_counts=True)
-    names = _listed([scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]])
+    names = _list([scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]])
     return [
         f"{len(detail):,} triangles of {count(len(owners), 'object')} ({names}) are small, dense "
         "and round and count as detail, which neither divides nor hides; --structural NAME or "
@@ -71,7 +71,7 @@ def door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list[
     ):
         chosen = [leaves[i] for i in np.flatnonzero(which)]
         if chosen:
-            names = _listed([f"{leaf.name} at {_triple(leaf.middle)}" for leaf in chosen])
+            names = _list([f"{leaf.name} at {_triple(leaf.middle)}" for leaf in chosen])
             leaf = count(len(chosen), "door leaf", "door leaves")
             notes.append(f"{leaf} ({names}) {'is' if len(chosen) == 1 else 'are'} {state}")
     return notes
@@ -92,12 +92,12 @@ def unrecognised_door_notes(scene: Scene, leaves: list[DoorLeaf]) -> list[str]:
     no triangle in a door leaf."""
     named = triangles_named(scene, is_door_name)
     taken = np.concatenate([np.zeros(0, dtype=np.int64), *(leaf.triangles for leaf in leaves)])
-    left = np.setdiff1d(scene.triangle_object[named], scene.triangle_object[taken])
-    if not len(left):
+    walls = np.setdiff1d(scene.triangle_object[named], scene.triangle_object[taken])
+    if not len(walls):
         return []
     return [
         "named like a door but treated as a wall, because of its size or of no space on both "
-        f"sides: {_listed([scene.objects[i] for i in left])}; --door NAME makes it a door"
+        f"sides: {_list([scene.objects[i] for i in walls])}; --door NAME makes it a door"
     ]
 
 
@@ -133,9 +133,9 @@ def unreached_notes(unreached: Unreached, kept: bool, place: float, strict: bool
     ways = {f"--viewpoint {_position(outside)}": outside.place} if outside else {}
     if rooms and not kept:
         ways = {"--reach all": sum(room.place for room in rooms), **ways}
-    left = sum(ways.values())
-    if left > MUCH * (left + place):
-        much = f"{left / (left + place):.0%} of the walkable floor is left out"
+    left_out = sum(ways.values())
+    if left_out > MUCH * (left_out + place):
+        much = f"{left_out / (left_out + place):.0%} of the walkable floor is left out"
         remedy = f"{' and '.join(ways)} {'keep' if len(ways) > 1 else 'keeps'} it"
         if strict:
             raise InputError("PTM-I305", much, remedy=f"{remedy}; or build without --strict")
@@ -186,7 +186,7 @@ def undecided_notes(undecided: Mapping[str, int]) -> list[str]:
     return notes
 
 
-def _listed(names: list[str]) -> str:
+def _list(names: list[str]) -> str:
     """The first `NAMED` names."""
     return ", ".join([*names[:NAMED], *["…"] * (len(names) > NAMED)])
 

@@ -117,7 +117,7 @@ def _pieces(scene: Scene, triangles: Ints) -> Slabs:
     """The connected pieces of objects, of these triangles."""
     mesh = Welded.of(scene.points, scene.triangles[triangles])
     source = triangles[mesh.source]
-    return Slabs.of(mesh.corners, _crossed(connected_pieces(mesh), scene.triangle_object[source]))
+    return Slabs.of(mesh.corners, _cross(connected_pieces(mesh), scene.triangle_object[source]))
 
 
 def _named_slabs(scene: Scene, triangles: Ints, slack: float) -> Slabs:
@@ -125,8 +125,8 @@ def _named_slabs(scene: Scene, triangles: Ints, slack: float) -> Slabs:
     several rectangles of that size is no leaf, unless they are the two faces of one slab."""
     mesh = Welded.of(scene.points, scene.triangles[triangles])
     owner = scene.triangle_object[triangles[mesh.source]]
-    piece = _crossed(connected_pieces(mesh), owner)
-    region = _crossed(Facets.of(mesh, scene.tolerance).region, owner)
+    piece = _cross(connected_pieces(mesh), owner)
+    region = _cross(Facets.of(mesh, scene.tolerance).region, owner)
     pieces, flat = Slabs.of(mesh.corners, piece), Slabs.of(mesh.corners, region)
     whole = np.zeros(len(flat), dtype=np.int64)
     whole[region] = piece
@@ -146,14 +146,14 @@ def _named_slabs(scene: Scene, triangles: Ints, slack: float) -> Slabs:
 def _flat(scene: Scene, structure: Structure, which: Ints) -> Slabs:
     """The flat regions of the structure of the size of a door, separated by object and material."""
     source = structure.source[which]
-    group = _crossed(
+    group = _cross(
         structure.region[which], scene.triangle_object[source], scene.triangle_material[source]
     )
     slabs = Slabs.of(structure.corners[which], group)
     return slabs.only(_door_sized(slabs, structure.tolerance.plane))
 
 
-def _crossed(*names: NDArray[np.integer]) -> Ints:
+def _cross(*names: NDArray[np.integer]) -> Ints:
     """(n,) numbers from 0, one for each combination of (n,) names."""
     result = np.zeros(len(names[0]), dtype=np.int64)
     for name in names:
@@ -213,7 +213,7 @@ def _leaves(
     corners, of = scene.corners, opaque.source
     region = np.zeros(len(corners), dtype=np.int64)
     owner = scene.triangle_object[of], scene.triangle_material[of]
-    region[of] = 1 + _crossed(opaque.facets.region, *owner)
+    region[of] = 1 + _cross(opaque.facets.region, *owner)
     size = np.bincount(region)
     nearby = Nearby(corners, slack)
     reach = np.array([RELIEF, slack, slack])
@@ -232,7 +232,7 @@ def _leaves(
         names, count = np.unique(region[about[own]], return_counts=True)
         whole = names[(count == size[names]) | (names == 0)]  # 0: outside all regions
         own &= np.isin(region[about], whole)
-        own[own] = ~_repeated(corners[about], own)
+        own[own] = ~_find_repeats(corners[about], own)
         triangles = about[own]
         if len(triangles):
             largest = triangles[np.argmax(areas(corners[triangles]))]
@@ -240,7 +240,7 @@ def _leaves(
             yield DoorLeaf(name, axes, low, high, triangles)
 
 
-def _repeated(corners: Floats, which: Bools) -> Bools:
+def _find_repeats(corners: Floats, which: Bools) -> Bools:
     """For each triangle ``which``, (n,), of (n, 3, 3), whether one of the others is the same."""
     _, point = distinct(corners.reshape(-1, 3))
     _, row = distinct(np.sort(point.reshape(-1, 3), axis=1))
@@ -315,14 +315,16 @@ class Doors:
     def lead_out(self, portals: list[Portal], outside: Bools) -> Bools:
         """(d,) which leaves have portals around them that lead ``outside``, (L,): some frames leave
         a gap into the wall."""
-        out = [p.polygon for p in portals if outside[p.leaves[0]] != outside[p.leaves[1]]]
+        # Each leaf's box, a little wider, is compared with the boxes around the n polygons of the
+        # portals that lead out, along the axes of the leaf: corners (p, 3), boxes (n, 3).
+        ways_out = [p.polygon for p in portals if outside[p.leaves[0]] != outside[p.leaves[1]]]
         reach = np.array([RELIEF, _BEYOND, _BEYOND])
         result = np.zeros(len(self.leaves), dtype=bool)
-        if out:
-            points = np.concatenate(out)
-            first = np.cumsum([0, *(len(polygon) for polygon in out[:-1])])
+        if ways_out:
+            corners = np.concatenate(ways_out)
+            first = np.cumsum([0, *(len(polygon) for polygon in ways_out[:-1])])
             for i, door in enumerate(self.leaves):
-                local = points @ door.axes.T
+                local = corners @ door.axes.T
                 low, high = (f.reduceat(local, first) for f in (np.minimum, np.maximum))
                 meets = (high >= door.low - reach) & (low <= door.high + reach)
                 result[i] = meets.all(axis=1).any()
@@ -359,7 +361,7 @@ def open_doors(
     rooms = tuple(np.flatnonzero(within).tolist())
     outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
     while which.any():
-        opened, more = _opened(doors, which, structure, tree, portals, hiding)
+        opened, more = _open(doors, which, structure, tree, portals, hiding)
         if not (flood(len(tree.leaves), more, rooms) & outer).any():
             return which, opened, more
         out = doors.lead_out(more, outside) & which
@@ -367,7 +369,7 @@ def open_doors(
     return None
 
 
-def _opened(
+def _open(
     doors: Doors,
     which: Bools,
     structure: Structure,

@@ -196,14 +196,20 @@ def free_on_both_sides(slabs: Slabs, structure: Structure) -> Bools:
 
 
 def _closes_by_rays(rays: _Rays, wall_thickness: float) -> Bools:
+    """(k,) which slabs have a wall beside and above them, the reveals of an opening on one side,
+    a floor on one side and room on both."""
+    # (k,) metres from the middle of each slab: to its faces, and, for each of the three sides in
+    # `_SIDES`, ahead and back to the faces of the wall there.
     half = rays.size[:, 0] / 2
     walls = [_wall(rays, *side, half, wall_thickness) for side in _SIDES]
     result: Bools = np.all([np.isfinite(ahead) for ahead, _ in walls], axis=0)
     revealed, floors = np.zeros(len(result), dtype=bool), []
-    for k, turn in ((0, 1.0), (1, -1.0)):
+    for k, turn in ((0, 1.0), (1, -1.0)):  # ahead, and back
+        # The reveals are looked for half way between the slab and the nearer face of the wall.
         depth = np.minimum(walls[0][k], walls[1][k]) - half
         depth = np.where(np.isfinite(depth), depth, 0.0)
         revealed |= (depth >= _REVEAL) & _revealed(rays, turn * (half + depth / 2))
+        # The floor is measured just outside the wall, from a little above the foot of the slab.
         room = np.maximum(walls[0][k], walls[1][k])
         room = np.where(np.isfinite(room), room, 0.0) + 2 * _GAP
         below = rays.at(turn * room, _SHARES, np.zeros(3), above=2 * _GAP)

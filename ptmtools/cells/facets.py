@@ -127,7 +127,7 @@ class Facets:
         chosen = np.flatnonzero(many)
         outline = rim & many[self.region][:, None]
         area = summed(self.region, self.areas * which, len(self.area))[chosen]
-        corners, of = self._retriangulated(chosen, area, outline, tolerance)
+        corners, of = self._retriangulate(chosen, area, outline, tolerance)
         # Wound as most of the region is.
         facing = self.areas * which * np.where(self.turned, -1.0, 1.0)
         facing = summed(self.region, facing, len(self.area))[chosen]
@@ -147,7 +147,7 @@ class Facets:
         order = np.argsort(source, kind="stable")
         return every[order], source[order]
 
-    def _retriangulated(
+    def _retriangulate(
         self, chosen: Ints, area: Floats, outline: Bools, tolerance: Tolerance
     ) -> tuple[Floats, Ints]:
         """Triangles (m, 3, 3) of the chosen regions, whose ``area`` these (n, 3) edges outline, and
@@ -174,9 +174,9 @@ class Facets:
         sound = shapely.is_valid(areas) & (np.abs(shapely.area(areas) - area) <= allowed)
         sound_rows = np.flatnonzero(sound)
         rings, which = divided(areas[sound_rows])
-        return self._lifted(rings, sound_rows[which], flat, of, space)
+        return self._lift(rings, sound_rows[which], flat, of, space)
 
-    def _lifted(
+    def _lift(
         self, rings: Floats, which: Ints, flat: Floats, of: Ints, space: Floats
     ) -> tuple[Floats, Ints]:
         """(m, 3, 3) positions of (k, 3, 2) triangles of regions ``which``, those of the ends of

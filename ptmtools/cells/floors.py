@@ -68,9 +68,9 @@ class Floors:
         if np.count_nonzero(patch) < _SCAN:
             patch[:] = False
         cube = np.floor(corners[patch].mean(axis=1) / max(grain, np.finfo(float).tiny))
-        _, of = distinct(np.column_stack([cube, front[patch]]))
-        region = np.where(patch, 0, region + 1 + len(of))
-        region[patch] = of
+        _, patch_number = distinct(np.column_stack([cube, front[patch]]))
+        region = np.where(patch, 0, region + 1 + len(patch_number))
+        region[patch] = patch_number
         order = np.argsort(region, kind="stable")
         first, region = np.unique(region[order], return_index=True, return_inverse=True)[1:]
         corners, region = corners[order], region.reshape(-1)
@@ -85,16 +85,16 @@ class Floors:
         """(k,) the polygons of (k,) regions, seen from above."""
         count = self._start[regions + 1] - self._start[regions]
         rows = ranges(self._start[regions], count)
-        of = np.repeat(np.arange(len(regions)), count)
+        owner = np.repeat(np.arange(len(regions)), count)
         flat = self.corners[rows][:, :, PLAN]
         result = np.full(len(regions), shapely.Polygon(), dtype=object)
         patch = self.patch[regions]
-        some = ~patch[of]
-        names, united = united_by(of[some], shapely.polygons(flat[some]), grid, more=True)
+        some = ~patch[owner]
+        names, united = united_by(owner[some], shapely.polygons(flat[some]), grid, more=True)
         result[names] = united
         if patch.any():
             points, place = flat[~some].reshape(-1, 2), np.cumsum(patch) - 1
-            clouds = shapely.multipoints(points, indices=np.repeat(place[of[~some]], 3))
+            clouds = shapely.multipoints(points, indices=np.repeat(place[owner[~some]], 3))
             result[patch] = shapely.convex_hull(clouds)
         return result
 

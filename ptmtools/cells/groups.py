@@ -126,13 +126,17 @@ def join_by_gain(
 class _Costs(Groups):
     """Groups and their costs."""
 
-    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
-        """``sees``: (L, L) which leaves a group sees; ``own``: (L, 2) its volume and area,
+    def __init__(
+        self, sees: Bools, sums: Floats, every: Floats, pairs: NDArray[np.integer]
+    ) -> None:
+        """``sees``: (L, L) which leaves a group sees; ``sums``: (L, 2) its volume and area,
         ``every``: those of the leaves. The first two change as groups grow, and a group that
         has joined another has nothing."""
         super().__init__(len(sees), pairs)
-        self.sees, self.own, self.every = sees, own, every
-        self.before = [cost(row, each, every) for row, each in zip(sees, own, strict=True)]
+        self.sees, self.own, self.every = sees, sums, every
+        self.before = [
+            cost(row, sum_of_group, every) for row, sum_of_group in zip(sees, sums, strict=True)
+        ]
 
     def together(self, a: int, b: int) -> float:
         """The cost of two groups joined."""
@@ -165,8 +169,10 @@ class _Attached(_Costs):
     """Pairs of groups, one without viewers; the cost is the share that joining adds to all
     costs."""
 
-    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
-        super().__init__(sees, own, every, pairs)
+    def __init__(
+        self, sees: Bools, sums: Floats, every: Floats, pairs: NDArray[np.integer]
+    ) -> None:
+        super().__init__(sees, sums, every, pairs)
         self._all = sum(self.before)
         self._added = 0.0
 
@@ -186,11 +192,11 @@ class _Attached(_Costs):
         return super().join(a, b)
 
 
-def cost(seen: Bools, own: Floats, every: Floats) -> float:
+def cost(seen: Bools, sums: Floats, every: Floats) -> float:
     """The cost of a group that sees leaves, (L,), and has a volume and an area, (2,); ``every``:
     (L, 2) those of the leaves."""
     volume, area = every[seen].sum(axis=0)
-    return float(own[0] * area + own[1] * volume)
+    return float(sums[0] * area + sums[1] * volume)
 
 
 def gain_of(sees: Bools, every: Floats, group: Ints) -> float:

@@ -23,7 +23,7 @@ from ptmtools.cells.outlines import (
     loops,
     split_at_corners,
     straight_corners,
-    united,
+    unite_edges,
 )
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.planar import triangulated
@@ -156,7 +156,9 @@ class _Parts:
     owner: NDArray[np.integer]  # (n, 2)
 
 
-def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: Tolerance) -> Mesh:
+def join_pieces(
+    scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: Tolerance
+) -> Mesh:
     """Join pieces with the same ``owner``: (M, 2) the cells in front of and behind each piece, -1
     for none. Pieces without owners are dropped."""
     count = len(scene.triangles)
@@ -273,7 +275,7 @@ class _Network:
         apart, fixed = np.zeros(count, dtype=np.bool_), self.fixed.copy()
         while True:
             kind = np.where(apart, len(self.points) + np.arange(count), self.kind)
-            outline, union = united(self.edges, kind)
+            outline, union = unite_edges(self.edges, kind)
             row, of = self._triangles(outline, fixed)
             done = np.zeros(count, dtype=np.bool_)
             done[of] = True
@@ -297,23 +299,28 @@ class _Network:
     def _triangles(self, outline: Edges, fixed: Bools) -> tuple[Ints, Ints]:
         """(m, 3) edges of the outlines of unions, whose starts are the corners of triangles, and
         (m,) the union of each; without corners that no edge needs, unless they are ``fixed``."""
+        # 1. Edges follow one another in loops, each edge once: row (e,), loop k is
+        #    row[start[k]:start[k + 1]]; ``flat`` (e, 2, 2) has the ends of each in its plane.
         frame, origin = self.frame[outline.polygon], self.points[self.corner[outline.polygon, 0]]
         ends = np.stack([self.points[outline.start], self.points[outline.end]], axis=1)
         flat = np.einsum("nek,nfk->nef", ends - origin[:, None], frame)
         row, start = loops(flat, outline)
         corner = outline.start[row]
-        gone = np.zeros(len(self.points), dtype=np.bool_)
-        gone[straight_corners(self.points, outline, self.reach)] = True
-        gone &= ~fixed
-        while len(bent := bent_corners(self.points[corner], start, gone[corner], self.reach)):
-            gone[corner[bent]] = False
+        # 2. Corners on straight edges go, in all unions or in none, unless they are fixed, so many
+        #    small bends would make a large one, or their loop would keep fewer than three.
+        spare = np.zeros(len(self.points), dtype=np.bool_)
+        spare[straight_corners(self.points, outline, self.reach)] = True
+        spare &= ~fixed
+        while len(bent := bent_corners(self.points[corner], start, spare[corner], self.reach)):
+            spare[corner[bent]] = False
         loop = np.repeat(np.arange(len(start) - 1), np.diff(start))
-        stays = ~gone[corner]
+        stays = ~spare[corner]
         stays &= np.bincount(loop[stays], minlength=len(start) - 1)[loop] >= 3
         row, size = row[stays], np.bincount(loop[stays])
         size = size[size > 0]
         start = np.append(0, np.cumsum(size)).astype(np.int64)
-        # The outer loop of each union first; it alone runs counter-clockwise.
+        # 3. The outer loop of each union comes first; it alone runs counter-clockwise, by twice its
+        #    signed area.
         x, y = flat[row, 0].T
         after = np.arange(len(row)) + 1
         after[start[1:] - 1] = start[:-1]
@@ -321,12 +328,14 @@ class _Network:
         union = outline.polygon[row[start[:-1]]]
         order = np.lexsort((area <= 0, union))
         row = row[ranges(start[order], size[order])]
-        named, polygon = np.unique(union[order], return_inverse=True)
+        unions, polygon = np.unique(union[order], return_inverse=True)
+        polygon = polygon.reshape(-1)
+        # 4. Unions with one outer loop are divided into triangles: (m, 3) rows of ``row``.
         start = np.append(0, np.cumsum(size[order]))
-        corners_of, of = triangulated(flat[row, 0], start, polygon.reshape(-1))
-        simple = np.bincount(polygon.reshape(-1), area[order] > 0) == 1
-        corners_of, of = corners_of[simple[of]], of[simple[of]]
-        return row[corners_of], named[of]
+        triangle, owner = triangulated(flat[row, 0], start, polygon)
+        simple = np.bincount(polygon, area[order] > 0) == 1
+        triangle, owner = triangle[simple[owner]], owner[simple[owner]]
+        return row[triangle], unions[owner]
 
     def _first_starts(self, union: Ints, key: Ints) -> Ints:
         """The first edges that start in corners of unions; ``key``: union · points + corner."""

@@ -177,8 +177,8 @@ class Cells:
     @property
     def room_numbers(self) -> NDArray[np.int32]:
         """(C,) `cell_room`, with a number of its own for each cell in no named room."""
-        own = np.arange(len(self.rooms), len(self.rooms) + self.cell_count, dtype=np.int32)
-        return np.where(self.cell_room >= 0, self.cell_room, own) if self.rooms else own
+        unnamed = np.arange(len(self.rooms), len(self.rooms) + self.cell_count, dtype=np.int32)
+        return np.where(self.cell_room >= 0, self.cell_room, unnamed) if self.rooms else unnamed
 
     @property
     def standing(self) -> NDArray[np.bool_]:
@@ -291,9 +291,9 @@ class Cells:
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         names = ("walker", "ceiling", "closed", "notes", "visible", "owners")
         about = {name: arrays.pop(name) for name in names}
-        rooms, of = arrays.pop("rooms"), arrays.pop("cell_room")
+        rooms, cell_room = arrays.pop("rooms"), arrays.pop("cell_room")
         if rooms:
-            about["rooms"], arrays["cell_room"] = rooms, of
+            about["rooms"], arrays["cell_room"] = rooms, cell_room
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         arrays |= arrays.pop("tolerance").to_arrays()
         floor = arrays["eye_floor"].reshape(-1, 3)

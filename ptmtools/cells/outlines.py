@@ -99,7 +99,7 @@ def _on_edges(points: Floats, edges: Edges, line: Ints, reach: float) -> tuple[I
     return edge, corner, place
 
 
-def united(edges: Edges, kind: Ints) -> tuple[Edges, Ints]:
+def unite_edges(edges: Edges, kind: Ints) -> tuple[Edges, Ints]:
     """The edges that remain when polygons of one ``kind``, (polygons,), that share edges are
     united; and (polygons,) the first polygon of the union of each, which names the union."""
     number, way = edges.numbered()

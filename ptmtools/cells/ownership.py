@@ -54,16 +54,16 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     """Cut all triangles of a scene along the planes of a tree."""
     corners = scene.corners
     facing = normals(corners)
-    at, lying = _settled(tree, corners, facing, tolerance)
+    at, lying = _settle(tree, corners, facing, tolerance)
     front = np.where(at < 0, -2 - at, -1)
     cut = _cut(tree, _batch(corners, at >= 0, front, lying, at), facing, tolerance)
     cut = replace(cut, front=-2 - cut.at)
     # Pieces in a plane sink again, siding with their backs.
     back = at.copy()
     twice = np.flatnonzero(lying & (at < 0))
-    back[twice], _ = _settled(tree, corners[twice], -facing[twice], tolerance)
+    back[twice], _ = _settle(tree, corners[twice], -facing[twice], tolerance)
     again = cut.take(cut.lying)
-    down, _ = _settled(tree, again.corner[..., :3], -facing[again.source], tolerance)
+    down, _ = _settle(tree, again.corner[..., :3], -facing[again.source], tolerance)
     boundary = _batch(corners, (at < 0) & (back >= 0), front, lying, back)
     boundary = _Batch.join([boundary, replace(again, at=down)])
     boundary = _cut(tree, boundary, -facing, tolerance)
@@ -90,7 +90,7 @@ def _batch(corners: Floats, which: Bools, front: Ints, lying: Bools, at: Ints) -
     return _Batch(corner, rows, front[rows], lying[rows], at[rows])
 
 
-def _settled(
+def _settle(
     tree: Tree, corners: Floats, facing: Floats, tolerance: Tolerance
 ) -> tuple[Ints, Bools]:
     """(n,) the node that first cuts each of (n, 3, 3) triangles, or its leaf i as -2 - i, and (n,)
@@ -115,35 +115,41 @@ def _cut(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> _Ba
     nothing = batch.take(np.zeros(0, dtype=np.int64))
     stack = [(0, nothing)] if len(tree.planes) else []
     while stack:
-        node, here = stack.pop()
+        node, present = stack.pop()
         if node < 0:
-            arrived.append(replace(here, at=np.full(len(here.at), node)))
+            arrived.append(replace(present, at=np.full(len(present.at), node)))
             continue
         waiting = order[start[node] : start[node + 1]]
-        here = _Batch.join([here, batch.take(waiting)]) if len(waiting) else here
-        sides = _parted(here, tree.planes[node], facing, tolerance) if len(here.at) else [here] * 2
+        present = _Batch.join([present, batch.take(waiting)]) if len(waiting) else present
+        sides = (
+            _divide_batch(present, tree.planes[node], facing, tolerance)
+            if len(present.at)
+            else [present] * 2
+        )
         stack += zip(tree.children[node].tolist(), sides, strict=True)
     return _Batch.join(arrived)
 
 
-def _parted(here: _Batch, plane: Floats, facing: Floats, tolerance: Tolerance) -> list[_Batch]:
+def _divide_batch(
+    batch: _Batch, plane: Floats, facing: Floats, tolerance: Tolerance
+) -> list[_Batch]:
     """The parts of pieces in front of a (4,) plane, and behind it."""
-    x, y, z = (here.corner[..., k] for k in range(3))
+    x, y, z = (batch.corner[..., k] for k in range(3))
     distance = x * plane[0] + y * plane[1] + z * plane[2] + plane[3]  # the same bits as in `sink`
     ahead = distance > tolerance.plane
     behind = distance < -tolerance.plane
     some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
     lies = ~some_ahead & ~some_behind
-    turned = facing[here.source] @ plane[:3] > 0
+    turned = facing[batch.source] @ plane[:3] > 0
     to_front = some_ahead & ~some_behind | lies & turned
     to_back = some_behind & ~some_ahead | lies & ~turned
     crossing = some_ahead & some_behind
-    here = replace(here, lying=here.lying | lies)
-    sides = [[here.take(to_front)], [here.take(to_back)]]
+    batch = replace(batch, lying=batch.lying | lies)
+    sides = [[batch.take(to_front)], [batch.take(to_back)]]
     if crossing.any():
         sign = ahead[crossing].astype(np.int8) - behind[crossing]
         for side, parts in zip(
-            sides, _split(here.take(crossing), distance[crossing], sign), strict=True
+            sides, _split(batch.take(crossing), distance[crossing], sign), strict=True
         ):
             side.extend(parts)
     return [_Batch.join(side) for side in sides]
@@ -158,7 +164,7 @@ def _split(
     touching = (sign == 0).any(axis=1)
     # One corner in the plane: cut from it to the opposite edge.
     rows = np.flatnonzero(touching)
-    b, d, s = _turned(batch, distance, sign, rows, np.argmax(sign[rows] == 0, axis=1))
+    b, d, s = _turn(batch, distance, sign, rows, np.argmax(sign[rows] == 0, axis=1))
     middle = _crossing(b, d, 1, 2)
     first, second = _triangle(b, 0, 1, middle), _triangle(b, 0, middle, 2)
     upper = s[:, 1] > 0
@@ -167,7 +173,7 @@ def _split(
     # One corner alone on its side: a triangle there, a quadrilateral on the other side.
     rows = np.flatnonzero(~touching)
     lone = np.argmax(sign[rows] == -np.sign(sign[rows].sum(axis=1))[:, None], axis=1)
-    b, d, s = _turned(batch, distance, sign, rows, lone)
+    b, d, s = _turn(batch, distance, sign, rows, lone)
     p, q = _crossing(b, d, 0, 1), _crossing(b, d, 0, 2)
     tip, base, rest = _triangle(b, 0, p, q), _triangle(b, p, 1, 2), _triangle(b, p, 2, q)
     upper = s[:, 0] > 0
@@ -176,7 +182,7 @@ def _split(
     return front, back
 
 
-def _turned(
+def _turn(
     batch: _Batch, distance: Floats, sign: NDArray[np.int8], rows: Ints, first: Ints
 ) -> tuple[_Batch, Floats, NDArray[np.int8]]:
     """The given rows with their corners turned so that ``first`` comes first."""
@@ -200,5 +206,5 @@ def _crossing(batch: _Batch, distance: Floats, i: int, j: int) -> Floats:
 
 def _triangle(batch: _Batch, *corners: int | Floats) -> _Batch:
     """The batch with its corners replaced: an old corner by index, or a new one."""
-    each = [batch.corner[:, c] if isinstance(c, int) else c for c in corners]
-    return replace(batch, corner=np.stack(each, axis=1))
+    columns = [batch.corner[:, c] if isinstance(c, int) else c for c in corners]
+    return replace(batch, corner=np.stack(columns, axis=1))

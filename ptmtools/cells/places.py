@@ -111,7 +111,9 @@ def find_places(
 ) -> Places:
     """The places of a walker on floors, among the triangles of a structure, (n, 3, 3)."""
     plan, region = _tiles(floors, tolerance)
-    search = _Search(_boxed(floors.corners), floors.slope, _boxed(structure), walker, tolerance)
+    search = _Search(
+        _with_boxes(floors.corners), floors.slope, _with_boxes(structure), walker, tolerance
+    )
     middle = shapely.get_coordinates(shapely.centroid(plan))
     order = along_a_curve(middle) if len(plan) else np.arange(0)
     blocks = np.array_split(order, max(1, -(-len(order) // _BLOCK)))
@@ -158,7 +160,7 @@ def _tiles(floors: Floors, tolerance: Tolerance) -> tuple[Geometry, Ints]:
 class _Search(NamedTuple):
     """What places are searched among: triangles of floors and of the structure, (n, 3, 3)."""
 
-    floors: tuple[Floats, Floats]  # and their boxes, see `_boxed`
+    floors: tuple[Floats, Floats]  # and their boxes, see `_with_boxes`
     slope: Floats  # `Floors.slope`
     structure: tuple[Floats, Floats]
     walker: Walker
@@ -195,7 +197,7 @@ class _Search(NamedTuple):
         return result
 
 
-def _boxed(corners: Floats) -> tuple[Floats, Floats]:
+def _with_boxes(corners: Floats) -> tuple[Floats, Floats]:
     """Triangles, (n, 3, 3), and the (4, n) least and greatest coordinates of each in plan."""
     flat = corners[:, :, PLAN]
     return corners, np.concatenate([flat.min(axis=1), flat.max(axis=1)], axis=1).T.copy()

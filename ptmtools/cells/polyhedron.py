@@ -113,7 +113,7 @@ def cut(
         if len(behind) > 2 and any(v < len(side) and side[v] < 0 for v in behind):
             back.append((behind, face_tag))
     every = np.array(points)
-    rim = _around(every, sorted(on | set(crossing.values())), plane[:3])
+    rim = _order_around(every, sorted(on | set(crossing.values())), plane[:3])
     front.append((rim[::-1], tag))
     back.append((rim, tag))
     return _compact(every, front), _compact(every, back)
@@ -130,7 +130,7 @@ def section(body: Polyhedron, plane: Floats, rounding: float) -> Floats:
     t = (distance[i] / (distance[i] - distance[j]))[:, None]
     crossing = body.points[i] + t * (body.points[j] - body.points[i])
     rim = np.concatenate([body.points[side == 0], crossing])
-    return rim[_around(rim, list(range(len(rim))), plane[:3])]
+    return rim[_order_around(rim, list(range(len(rim))), plane[:3])]
 
 
 def clip_polygon(polygon: Floats, plane: Floats, rounding: float) -> Floats:
@@ -151,7 +151,7 @@ def clip_polygon(polygon: Floats, plane: Floats, rounding: float) -> Floats:
     return kept
 
 
-def _around(points: Floats, loop: list[int], normal: Floats) -> list[int]:
+def _order_around(points: Floats, loop: list[int], normal: Floats) -> list[int]:
     """The vertices of a convex polygon in counter-clockwise order about ``normal``."""
     p = points[loop]
     p = p - p.mean(axis=0)

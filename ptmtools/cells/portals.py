@@ -50,7 +50,7 @@ class Rejoined:
     node: Ints  # (N,) the new node that each is, or -1
 
 
-def rejoined(tree: Tree, group: Ints) -> Rejoined:
+def rejoin_caps(tree: Tree, group: Ints) -> Rejoined:
     """The tree without the caps that separate nothing; ``group``: (L,) the connected group of each
     leaf that is kept, -1 for others. Planes of `Tree.hung` leaves hide, and stay."""
     bodies, children = list(tree.leaves), tree.children.copy()
@@ -72,7 +72,7 @@ def rejoined(tree: Tree, group: Ints) -> Rejoined:
             tree,
             walls=tuple(wall for wall, keeps in zip(tree.walls, kept, strict=True) if keeps),
             children=np.where(children >= 0, renumber[inner], -2 - leaf[outer]).astype(np.int32),
-            leaves=tuple(_renamed(bodies[whole], renumber) for whole in wholes),
+            leaves=tuple(_rename_tags(bodies[whole], renumber) for whole in wholes),
             capped={int(renumber[n]): body for n, body in tree.capped.items() if kept[n]},
             hung=frozenset(renumber[sorted(tree.hung)].tolist()),
         ),
@@ -81,7 +81,7 @@ def rejoined(tree: Tree, group: Ints) -> Rejoined:
     )
 
 
-def _renamed(body: Polyhedron, renumber: Ints) -> Polyhedron:
+def _rename_tags(body: Polyhedron, renumber: Ints) -> Polyhedron:
     return replace(body, tags=tuple(int(renumber[t]) if t >= 0 else t for t in body.tags))
 
 
@@ -104,7 +104,7 @@ def find_portals(
     return [portal for node in nodes for portal in _openings(node, *faces[node], tree, tolerance)]
 
 
-def portals_rejoined(
+def update_portals(
     portals: list[Portal], before: Tree, joint: Rejoined, tolerance: Tolerance
 ) -> list[Portal]:
     """`find_portals` of a rejoined tree; planes in which no leaf changed keep the ``portals`` of
@@ -119,7 +119,7 @@ def portals_rejoined(
         for portal in portals
         if portal.node not in stale and node[portal.node] >= 0
     ]
-    fresh = find_portals(joint.tree, tolerance, sorted({node[one] for one in stale} - {-1}))
+    fresh = find_portals(joint.tree, tolerance, sorted({node[number] for number in stale} - {-1}))
     return sorted(kept + fresh, key=lambda portal: portal.node)
 
 
@@ -147,14 +147,14 @@ def _openings(
         return
     wall = tree.walls[node]
     hung = node in tree.hung or wall.barring is not None
-    one, other = (
+    front_faces, back_faces = (
         shapely.polygons([shapely.linearrings(wall.frame.to_plane(points)) for _, points in faces])
         for faces in (ahead, behind)
     )
-    j, i = shapely.STRtree(one).query(other, predicate="intersects")
+    j, i = shapely.STRtree(front_faces).query(back_faces, predicate="intersects")
     order = np.lexsort((i, j))
     j, i = j[order], i[order]
-    shared = intersection(one[i], other[j], tolerance.grid, more=True)
+    shared = intersection(front_faces[i], back_faces[j], tolerance.grid, more=True)
     wide = shapely.area(shared) > 0
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:

@@ -97,11 +97,11 @@ class Volume:
         result[result] = windings(points[result], self.corners) > 1 / 2
         return result
 
-    def share_in(self, other: Volume) -> float:
+    def share_in(self, container: Volume) -> float:
         """The share of it that is in another volume."""
         points, winding = self.samples
-        own = points[winding > 1 / 2]
-        return float(other.contains(own).mean()) if len(own) else 0.0
+        inner = points[winding > 1 / 2]
+        return float(container.contains(inner).mean()) if len(inner) else 0.0
 
 
 def windings(points: Floats, corners: Floats) -> Floats:
@@ -138,25 +138,28 @@ class Volumes:
         if options.spaces == "none" or not scene.rooms:
             return Volumes()
         radius, _, height = options.walker
-        least, most = (2 * radius) ** 2 * height, float(np.ptp(scene.points, axis=0).prod())
-        left: dict[str, list[str]] = {}
+        least, building_size = (
+            (2 * radius) ** 2 * height,
+            float(np.ptp(scene.points, axis=0).prod()),
+        )
+        omitted: dict[str, list[str]] = {}
         rooms: list[Volume] = []
         for room in map(Volume.of, scene.rooms):
             if not room.size >= least:
-                left.setdefault("too small for a visitor", []).append(room.name)
-            elif room.size > (1 + TIE_SHARE) * most:
-                left.setdefault("larger than the building", []).append(room.name)
+                omitted.setdefault("too small for a visitor", []).append(room.name)
+            elif room.size > (1 + TIE_SHARE) * building_size:
+                omitted.setdefault("larger than the building", []).append(room.name)
             elif not room.closed:
-                left.setdefault("not closed", []).append(room.name)
+                omitted.setdefault("not closed", []).append(room.name)
             else:
                 rooms.append(room)
         kept = []
-        for room, fault in zip(rooms, _repeated(rooms), strict=True):
+        for room, fault in zip(rooms, _find_repeats(rooms), strict=True):
             if fault:
-                left.setdefault(fault, []).append(room.name)
+                omitted.setdefault(fault, []).append(room.name)
             else:
                 kept.append(room)
-        notes = tuple(left_out(names, fault) for fault, names in left.items())
+        notes = tuple(left_out(names, fault) for fault, names in omitted.items())
         return Volumes(tuple(kept), notes)
 
     def of_leaves(self, cells: Cells) -> Ints:
@@ -181,7 +184,7 @@ class Volumes:
         return result
 
 
-def _repeated(rooms: Sequence[Volume]) -> list[str]:
+def _find_repeats(rooms: Sequence[Volume]) -> list[str]:
     """For each closed volume why it is left out beside the others, or ""."""
     faults = [""] * len(rooms)
     boxes = np.array([room.box for room in rooms]).reshape(-1, 2, 3)
@@ -189,19 +192,23 @@ def _repeated(rooms: Sequence[Volume]) -> list[str]:
     for i, room in enumerate(rooms):
         meets = ((boxes[:, 0] <= room.box[1]) & (boxes[:, 1] >= room.box[0])).all(axis=1)
         for j in np.flatnonzero(meets).tolist():
-            other = rooms[j]
-            if i == j or faults[i] or faults[j] or room.size < _WITHIN * other.size:
+            inner_room = rooms[j]
+            if i == j or faults[i] or faults[j] or room.size < _WITHIN * inner_room.size:
                 continue
-            if other.share_in(room) < _WITHIN:
+            if inner_room.share_in(room) < _WITHIN:
                 continue
-            if _WITHIN * room.size > other.size or room.share_in(other) < _WITHIN:
+            if _WITHIN * room.size > inner_room.size or room.share_in(inner_room) < _WITHIN:
                 inner[i].append(j)
             else:
                 faults[max(i, j)] = "a duplicate of another"
     for i, others in enumerate(inner):
-        own = [j for j in others if faults[j] != "a duplicate of another"]
-        covered = sum(rooms[j].size for j in own)
-        if not faults[i] and len(own) >= _SEVERAL and covered >= _COVERED * rooms[i].size:
+        distinct_rooms = [j for j in others if faults[j] != "a duplicate of another"]
+        covered = sum(rooms[j].size for j in distinct_rooms)
+        if (
+            not faults[i]
+            and len(distinct_rooms) >= _SEVERAL
+            and covered >= _COVERED * rooms[i].size
+        ):
             faults[i] = "around several others"
     return faults
 
@@ -241,7 +248,7 @@ def unused_notes(volumes: Volumes, before: Ints, after: Ints) -> Iterator[str]:
             yield left_out([volumes.rooms[k].name for k in which], reason)
 
 
-def named(cells: Cells, volumes: Volumes, volume: Ints, room: Ints) -> Cells:
+def name_cells(cells: Cells, volumes: Volumes, volume: Ints, room: Ints) -> Cells:
     """Cells with names: those of the volume that most of their room is in. A cell of several rooms
     has the name of one that is most of it.
 
@@ -254,8 +261,8 @@ def named(cells: Cells, volumes: Volumes, volume: Ints, room: Ints) -> Cells:
     inside = np.zeros((len(rooms), len(volumes.rooms) + 1))  # the last column: in no volume
     np.add.at(inside, (row, volume[leaf]), size * cells.leaf_standing[leaf])
     best = inside[:, :-1].argmax(axis=1)
-    most = inside[np.arange(len(rooms)), best] > _MOST * inside.sum(axis=1)
-    called = [volumes.rooms[k].name * bool(m) for k, m in zip(best.tolist(), most, strict=True)]
+    mostly = inside[np.arange(len(rooms)), best] > _MOST * inside.sum(axis=1)
+    called = [volumes.rooms[k].name * bool(m) for k, m in zip(best.tolist(), mostly, strict=True)]
     pair, part = np.unique(cell.astype(np.int64) * len(rooms) + row, return_inverse=True)
     share = np.bincount(part.reshape(-1), size) / np.bincount(cell, size)[pair // len(rooms)]
     number: dict[int, int] = {}

@@ -35,7 +35,7 @@ from ptmtools.cells.groups import DIGITS, Groups, gain_of, join_by_gain
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry
-from ptmtools.cells.room_volumes import Volumes, named, unused_notes
+from ptmtools.cells.room_volumes import Volumes, name_cells, unused_notes
 from ptmtools.cells.search import connected
 from ptmtools.cells.sight import from_places, portals_of, sampled_sight
 from ptmtools.diagnostics import Warned
@@ -62,9 +62,11 @@ def rank_in_file(cells: Cells) -> Ints:
     source = cells.triangle_source
     count = int(source.max(initial=-1)) + 1
     pair, row = np.unique(leaf * count + source[piece], return_inverse=True)
-    held = np.bincount(row, area[piece])
+    held_area = np.bincount(row, area[piece])
     whole = np.bincount(source, area)[pair % max(count, 1)]
-    share = np.round(np.divide(held, whole, out=np.zeros(len(held)), where=whole > 0), GAIN_DIGITS)
+    share = np.round(
+        np.divide(held_area, whole, out=np.zeros(len(held_area)), where=whole > 0), GAIN_DIGITS
+    )
     holds = share > 0
     return _in_order(pair[holds] // count, pair[holds] % count, share[holds], cells.leaf_count)
 
@@ -128,7 +130,7 @@ def room_of_leaf(cells: Cells, rank: Ints, volume: Ints) -> Ints:
     room = regions.grown(lambda closed: -closed >= OPEN)
     standing = np.zeros(cells.leaf_count, dtype=np.bool_)
     standing[room[rank[cells.leaf_standing]]] = True
-    return _with_space_above(cells, _adopted(room, standing[room], openings)[rank])
+    return _with_space_above(cells, _adopt(room, standing[room], openings)[rank])
 
 
 def of_one_room(cells: Cells, volume: Ints) -> Ints:
@@ -140,8 +142,8 @@ def of_one_room(cells: Cells, volume: Ints) -> Ints:
     size = cells.leaf_volumes() * cells.leaf_standing
     several = []
     for name in range(int(volume.max()) + 1):
-        own = volume == name
-        parts = np.bincount(region[own], size[own]) if own.any() else np.zeros(1)
+        inside = volume == name
+        parts = np.bincount(region[inside], size[inside]) if inside.any() else np.zeros(1)
         if parts.sum() and parts.max() <= (1 + TIE_SHARE) * ONE_ROOM * parts.sum():
             several.append(name)
     return np.where(np.isin(volume, several), -1, volume)
@@ -166,21 +168,21 @@ def _with_space_above(cells: Cells, room: Ints) -> Ints:
     return result
 
 
-def _adopted(room: Ints, held: Bools, openings: dict[tuple[int, int, bool], float]) -> Ints:
-    """(L,) rooms, those that are not ``held``, (L,), divided among the rooms around them: from
+def _adopt(room: Ints, known: Bools, openings: dict[tuple[int, int, bool], float]) -> Ints:
+    """(L,) rooms, those that are not ``known``, (L,), divided among the rooms around them: from
     these on, the largest opening first, then passages."""
     adjacent: list[list[tuple[tuple[bool, float], int]]] = [[] for _ in room]
     for (a, b, passage), area in openings.items():
         order = passage, -float(f"{area:.{DIGITS}g}")
         adjacent[a].append((order, b))
         adjacent[b].append((order, a))
-    waiting = [(order, b, int(room[a])) for a in np.flatnonzero(held) for order, b in adjacent[a]]
+    waiting = [(order, b, int(room[a])) for a in np.flatnonzero(known) for order, b in adjacent[a]]
     heapq.heapify(waiting)
-    result, left = room.copy(), ~held
+    result, waits = room.copy(), ~known
     while waiting:
         _, leaf, name = heapq.heappop(waiting)
-        if left[leaf]:
-            result[leaf], left[leaf] = name, False
+        if waits[leaf]:
+            result[leaf], waits[leaf] = name, False
             for order, b in adjacent[leaf]:
                 heapq.heappush(waiting, (order, b, name))
     return result
@@ -221,8 +223,8 @@ class _Regions(Groups):
 
     def _apart(self, a: int, b: int) -> bool:
         """Whether the volumes that two regions are in keep them apart."""
-        one, two = self._within[a], self._within[b]
-        return bool(one != two and (self._only_within or min(one, two) >= 0))
+        first, second = self._within[a], self._within[b]
+        return bool(first != second and (self._only_within or min(first, second) >= 0))
 
     def openings(self) -> dict[tuple[int, int, bool], float]:
         """m² between two regions, the lower one first, by portals of sight and by passages."""
@@ -260,17 +262,17 @@ class _Regions(Groups):
         return changed
 
     def _largest_opening(self, doors: list[int]) -> float:
-        left, largest = set(doors), 0.0
+        remaining, largest = set(doors), 0.0
         for door in sorted(doors):
-            if door not in left:
+            if door not in remaining:
                 continue
-            left.discard(door)
+            remaining.discard(door)
             group, area = [door], 0.0
             while group:
                 k = group.pop()
                 area += self._area[k]
-                reached = [j for j in self._touching[k] if j in left]
-                left.difference_update(reached)
+                reached = [j for j in self._touching[k] if j in remaining]
+                remaining.difference_update(reached)
                 group += reached
             largest = max(largest, area)
         return largest
@@ -343,18 +345,18 @@ def grouped(cells: Cells, options: SubdivideOptions, volumes: Volumes | None = N
         rank = rank_in_file(cells)
         room = room_of_leaf(cells, rank, kept)
         group = _groups(cells, rank, room, options.gain, bool(volumes.rooms))
-    name = np.append(numbered(group[leaf]), np.int32(-1))
+    name = np.append(renumber(group[leaf]), np.int32(-1))
     leaf_cell = np.full(cells.leaf_count, -1, dtype=np.int32)
     leaf_cell[leaf] = name[:-1]
     cells = replace(cells, leaf_cell=leaf_cell, triangle_cell=name[cells.triangle_cell])
     if volumes.rooms:
-        cells = named(cells, volumes, kept, room)
+        cells = name_cells(cells, volumes, kept, room)
     if cells.cell_count == 1:
         cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
 
 
-def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
+def renumber(group: NDArray[np.integer]) -> NDArray[np.int32]:
     """(L,) groups renamed to 0, 1, … in the order in which they first occur."""
     _, first, row = np.unique(group, return_index=True, return_inverse=True)
     place = np.empty(len(first), dtype=np.int32)

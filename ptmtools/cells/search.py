@@ -176,7 +176,7 @@ class Bins:
         step = np.array([_STEP] * 3 + [_STEP * tolerance.extent])
         self.count = 0
         self._label = np.empty((len(planes), _GRIDS), dtype=np.int32)
-        own, widest = np.zeros(len(planes), dtype=np.int32), np.full(len(planes), -1.0)
+        home, widest = np.zeros(len(planes), dtype=np.int32), np.full(len(planes), -1.0)
         for grid in range(_GRIDS):
             at = planes / step + grid / _GRIDS
             key = np.floor(at)
@@ -184,9 +184,9 @@ class Bins:
             self._label[:, grid] = label + self.count
             self.count += len(first)
             inner = np.minimum(at - key, 1 - (at - key)).min(axis=1)
-            own[inner > widest] = self._label[inner > widest, grid]
+            home[inner > widest] = self._label[inner > widest, grid]
             widest = np.maximum(widest, inner)
-        self.own: NDArray[np.int32] = own  # (n,) the bin in which each plane is looked up
+        self.own: NDArray[np.int32] = home  # (n,) the bin in which each plane is looked up
 
     def weights(self, weights: Floats) -> Floats:
         """(b,) the sum in each bin of (n,) weights."""

@@ -94,8 +94,8 @@ def _lines(polygon: Floats, normal: Floats, share: Floats) -> tuple[Floats, Floa
     frame = np.stack([right, upward, normal])
     flat = (polygon - polygon[0]) @ frame[:2].T
     height = np.unique(flat[:, 1])
-    left, end = _chords(flat, height)
-    width, rise = end - left, np.diff(height)
+    begins, end = _chords(flat, height)
+    width, rise = end - begins, np.diff(height)
     until = np.cumsum((width[:-1] + width[1:]) * rise / 2)
     at = share[:, 0] * until[-1]
     k = np.minimum(np.searchsorted(until, at, "right"), len(rise) - 1)
@@ -104,7 +104,7 @@ def _lines(polygon: Floats, normal: Floats, share: Floats) -> tuple[Floats, Floa
     slope = width[k + 1] - width[k]
     root = np.sqrt(np.maximum(width[k] ** 2 + 2 * slope * part, 0.0))
     up = np.clip(2 * part / np.maximum(width[k] + root, np.finfo(np.float64).tiny), 0.0, 1.0)
-    begin = left[k] + up * (left[k + 1] - left[k])
+    begin = begins[k] + up * (begins[k + 1] - begins[k])
     x = begin + share[:, 1] * (width[k] + up * slope)
     origin = polygon[0] + np.stack([x, height[k] + up * rise[k]], axis=1) @ frame[:2]
     radius, turn = np.sqrt(share[:, 2]), 2 * np.pi * share[:, 3]

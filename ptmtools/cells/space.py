@@ -31,8 +31,8 @@ from ptmtools.cells.portals import (
     find_portals,
     flood,
     largest_leaf,
-    portals_rejoined,
-    rejoined,
+    rejoin_caps,
+    update_portals,
 )
 from ptmtools.cells.room_planes import split_at
 from ptmtools.cells.search import connected
@@ -82,9 +82,9 @@ class Standing:
         inside, leaf = _within(tree, leaves, points)
         return Standing(points, place, leaf).only(inside)
 
-    def joined(self, other: Standing) -> Standing:
+    def joined(self, bodies: Standing) -> Standing:
         """These bodies, then the others."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        pairs = zip(vars(self).values(), vars(bodies).values(), strict=True)
         return Standing(*map(np.concatenate, pairs))
 
     def only(self, rows: Bools | Ints) -> Standing:
@@ -193,10 +193,10 @@ def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
 
 def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
     """The bodies in each group of leaves with enough floor, the largest first."""
-    of = group[standing.leaf]
-    order = np.argsort(of, kind="stable")
-    start = np.searchsorted(of[order], np.arange(len(group) + 1))
-    area = summed(of, standing.place, len(group))
+    group_of_body = group[standing.leaf]
+    order = np.argsort(group_of_body, kind="stable")
+    start = np.searchsorted(group_of_body[order], np.arange(len(group) + 1))
+    area = summed(group_of_body, standing.place, len(group))
     for name in ranked(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
         yield standing.only(order[start[name] : start[name + 1]])
 
@@ -242,11 +242,11 @@ def divide(
     InputError: PTM-I111 if a viewpoint lies outside the box.
     """
     with counting() as undecided:
-        space = _divided(building, root, progress, inside)
+        space = _divide(building, root, progress, inside)
     return replace(space, undecided=undecided)
 
 
-def _divided(building: Building, root: Polyhedron, progress: Progress, inside: bool) -> Space:
+def _divide(building: Building, root: Polyhedron, progress: Progress, inside: bool) -> Space:
     structure, options = building.structure, building.options
     box, top, ceiling = np.stack(bounds(root.points)), building.ceiling, None
     if inside and top is not None:
@@ -283,7 +283,7 @@ def _divided(building: Building, root: Polyhedron, progress: Progress, inside: b
     if inside or closed:
         space = _complete(building, space, outer & (not inside))
     if inside or space.closed:
-        space = _rejoined(space, structure.tolerance)
+        space = _rejoin_caps(space, structure.tolerance)
         tree, portals, reached = split_at(
             building.contacts, space.tree, space.portals, space.reached, structure, options
         )
@@ -297,8 +297,8 @@ def _stands_elsewhere(tree: Tree, reached: Bools, building: Building) -> bool:
     structure = building.structure
     there = Standing.of(tree, ~reached, building)
     walled = Surroundings(structure.corners, structure.tolerance).inside(there.points, roofed=False)
-    here = float(Standing.of(tree, reached, building).place.sum())
-    return float(there.place[walled].sum()) > here
+    reached_place = float(Standing.of(tree, reached, building).place.sum())
+    return float(there.place[walled].sum()) > reached_place
 
 
 def _complete(building: Building, space: Space, outer: Bools) -> Space:
@@ -330,14 +330,14 @@ def _complete(building: Building, space: Space, outer: Bools) -> Space:
     return space
 
 
-def _rejoined(space: Space, tolerance: Tolerance) -> Space:
+def _rejoin_caps(space: Space, tolerance: Tolerance) -> Space:
     """The space without the splits by caps and doors that separate nothing."""
     tree, portals = space.tree, space.portals
     if not tree.capped:
         return space
     group = np.where(space.reached, groups(len(tree.leaves), portals), -1)
-    joint = rejoined(tree, group)
-    portals = portals_rejoined(portals, tree, joint, tolerance)
+    joint = rejoin_caps(tree, group)
+    portals = update_portals(portals, tree, joint, tolerance)
     reached = np.bincount(joint.leaf, space.reached) > 0
     return replace(space, tree=joint.tree, portals=portals, reached=reached)
 

@@ -74,7 +74,7 @@ class Structure:
         parts = [
             facets.fewer(~detail[rest] & (forced[rest] == value), file) for value in (False, True)
         ]
-        first = np.concatenate([*(rest[one] for _, one in parts), leaf])
+        first = np.concatenate([*(rest[rows] for _, rows in parts), leaf])
         order = np.argsort(first, kind="stable")
         regions = np.arange(len(source)) + len(facets.area)
         regions[rest] = facets.region
@@ -151,7 +151,7 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
         frame = Frame.of(plane)
         near = structure.nearby.between(plane, -tolerance.plane, tolerance.plane)
         flat = near[structure.lie_in(plane, near)]
-        if not _clustered(structure, frame, flat, least):
+        if not _may_hold_wall(structure, frame, flat, least):
             continue
         blocking = structure.united(frame, flat)
         shapely.prepare(blocking)
@@ -168,7 +168,7 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     return [walls_by_area[i][1] for i in ranked(np.array([area for area, _ in walls_by_area]))]
 
 
-def _clustered(structure: Structure, frame: Frame, flat: Ints, least: float) -> bool:
+def _may_hold_wall(structure: Structure, frame: Frame, flat: Ints, least: float) -> bool:
     """Whether these triangles in a plane may hold a wall of an area, m²: not the seats of a hundred
     benches, which are in small clusters by their boxes."""
     if len(flat) > _SEVERAL or structure.forced[flat].any():
@@ -180,7 +180,7 @@ def _clustered(structure: Structure, frame: Frame, flat: Ints, least: float) -> 
     return bool((summed(group, structure.areas[flat], len(flat)) >= least).any())
 
 
-def built(walls: list[WallPlane]) -> list[WallPlane]:
+def without_facets(walls: list[WallPlane]) -> list[WallPlane]:
     """The walls without the facets of a scanned surface, which would divide space by the thousand
     and enclose nothing: if most of very many walls, by area, are neither upright nor level."""
     rise = np.abs([wall.frame.plane[1] for wall in walls])
@@ -212,11 +212,11 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
         if not (free[seed] and tries.worth[seed]):
             continue
         free[seed] = False
-        own = bins.own[seed]
-        if waiting[own] < wall_area:
+        name = bins.own[seed]
+        if waiting[name] < wall_area:
             bins.drop(waiting, seed[None], weights[seed, None])
             continue
-        near = members_of[start[own] : start[own + 1]]
+        near = members_of[start[name] : start[name + 1]]
         near = near[free[near]]
         members = np.append(near[structure.lie_in(planes[seed], near)], seed)
         free[members] = False
@@ -290,14 +290,14 @@ class Surroundings:
         """The first surfaces that rays from (n, 3) points along (n, 3) unit vectors meet: (n,)
         distances, metres, infinite without a hit, and (n, 3) unit normals."""
         hit = self._hits(points, along)[0]
-        far, facing = np.full(len(points), np.inf), np.zeros((len(points), 3))
+        distance, facing = np.full(len(points), np.inf), np.zeros((len(points), 3))
         met = np.flatnonzero(hit >= 0)
         normal = self._front[hit[met]]
         to = np.einsum("ij,ij->i", self._corners[hit[met], 0] - points[met], normal)
         turn = np.einsum("ij,ij->i", along[met], normal)
-        far[met] = np.divide(to, turn, out=np.zeros(len(met)), where=turn != 0)
+        distance[met] = np.divide(to, turn, out=np.zeros(len(met)), where=turn != 0)
         facing[met] = normal
-        return far, facing
+        return distance, facing
 
     def inside(self, points: Floats, roofed: bool = True) -> Bools:
         """(n,) which of (n, 3) points are between walls and, if the building is ``roofed``, under a

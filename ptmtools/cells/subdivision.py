@@ -33,7 +33,7 @@ from ptmtools.cells.diagnostics import (
 )
 from ptmtools.cells.doors import THICK
 from ptmtools.cells.floors import ROOFED, roofed_share
-from ptmtools.cells.joining import joined
+from ptmtools.cells.joining import join_pieces
 from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
@@ -173,7 +173,7 @@ def _cut_and_group(
     if options.doors == "hidden":
         owner[np.isin(pieces.source, opened)] = -1
     count(space.undecided)
-    return replace(cells, **vars(joined(scene, pieces, owner, tolerance)), opened=opened)
+    return replace(cells, **vars(join_pieces(scene, pieces, owner, tolerance)), opened=opened)
 
 
 def _portal_count(space: Space) -> int:
@@ -389,9 +389,9 @@ def _any_face_seen(scene: Scene, cells: Cells) -> bool:
     low, high = np.full((2, cells.cell_count, 3), [[[np.inf]], [[-np.inf]]])
     starts = cells.leaf_point_start[:-1]
     kept = cells.leaf_cell >= 0
-    of = cells.leaf_cell[kept]
-    np.minimum.at(low, of, np.minimum.reduceat(cells.leaf_point, starts)[kept])
-    np.maximum.at(high, of, np.maximum.reduceat(cells.leaf_point, starts)[kept])
+    leaf_cell = cells.leaf_cell[kept]
+    np.minimum.at(low, leaf_cell, np.minimum.reduceat(cells.leaf_point, starts)[kept])
+    np.maximum.at(high, leaf_cell, np.maximum.reduceat(cells.leaf_point, starts)[kept])
     corners = cells.vertex[cells.triangle[piece]]
     facing = normals(corners)
     furthest = np.where(facing > 0, high[cell], low[cell])

@@ -129,8 +129,8 @@ def portal_flow(
         )
         for p, (_, figures) in zip(batch, results, strict=True):
             cut[p], *counts[:, p] = figures
-        each = max(1, int(counts[0, batch].mean()))
-        together = max(1, min(BATCH // 2, TASK // each))  # the next ones take about as long
+        work = max(1, int(counts[0, batch].mean()))
+        together = max(1, min(BATCH // 2, TASK // work))  # the next ones take about as long
         settle(searching, batch, np.stack([seen for seen, _ in results]))
         progress(min(first + BATCH, count), count, "portals")
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))

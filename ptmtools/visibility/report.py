@@ -108,10 +108,10 @@ def report(cells: Cells, pvs: Pvs) -> PvsReport:
 
 
 def _facts(cells: Cells, k: int) -> dict[str, Any]:
-    one, other = (int(cells.leaf_cell[leaf]) for leaf in cells.portal_leaf[k])
+    a, b = (int(cells.leaf_cell[leaf]) for leaf in cells.portal_leaf[k])
     return {
         "portal": k,
-        "cells": (one, other),
+        "cells": (a, b),
         "area": float(cells.portal_area[k]),
         "centre": tuple(cells.portal(k).mean(axis=0).tolist()),
     }

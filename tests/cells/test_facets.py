@@ -99,7 +99,7 @@ def test_a_triangulation_with_a_corner_of_its_own_is_not_taken() -> None:
     flat, of = space[:, :, :2], np.repeat([3, 5], 3)
     rings = np.array([[[0, 0], [4, 0], [0, 4]], [[0, 0], [4, 0], [2, 2]], [[0, 0], [2, 2], [0, 4]]])
     with counting() as undecided:
-        actual, which = facets._lifted(rings.astype(float), np.array([3, 5, 5]), flat, of, space)
+        actual, which = facets._lift(rings.astype(float), np.array([3, 5, 5]), flat, of, space)
     assert np.array_equal(actual, space[None, :3, 0])
     assert which.tolist() == [3]
     assert undecided == {"triangles": 1}

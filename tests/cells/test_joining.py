@@ -13,7 +13,7 @@ import pytest
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide, subdivision
-from ptmtools.cells.joining import Mesh, joined, patches
+from ptmtools.cells.joining import Mesh, join_pieces, patches
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.planar import triangulated
 from ptmtools.cells.search import first_alike, welded
@@ -25,14 +25,14 @@ CHUNK = 64
 
 
 def taken_apart(monkeypatch: pytest.MonkeyPatch, scene: Scene, **options: Any) -> tuple[Any, ...]:
-    """What `joined` is given for a scene: pieces of everything, those of nobody too."""
+    """What `join_pieces` is given for a scene: pieces of everything, those of nobody too."""
     given: list[Any] = []
 
     def spy(*arguments: Any) -> Mesh:
         given.append(arguments)
-        return joined(*arguments)
+        return join_pieces(*arguments)
 
-    monkeypatch.setattr(subdivision, "joined", spy)
+    monkeypatch.setattr(subdivision, "join_pieces", spy)
     subdivide(scene, SubdivideOptions(**options))
     return tuple(given[0])
 
@@ -90,7 +90,7 @@ def given(
     room_faces: Any,
     partition: Any,
 ) -> tuple[Any, ...]:
-    """The arguments of `joined` for several scenes."""
+    """The arguments of `join_pieces` for several scenes."""
     if request.param == "halls":
         return taken_apart(monkeypatch, halls(quads, room_faces, partition))
     file = shared / "scenes/hospital/hospital.obj"
@@ -101,7 +101,7 @@ def given(
 
 def test_joined_pieces(given: tuple[Any, ...]) -> None:
     scene, pieces, owner, tolerance = given
-    mesh = joined(scene, pieces, owner, tolerance)
+    mesh = join_pieces(scene, pieces, owner, tolerance)
     owned = (owner >= 0).any(axis=1)
     assert len(mesh.triangle) < owned.sum()
 
@@ -145,7 +145,7 @@ def test_joined_pieces(given: tuple[Any, ...]) -> None:
 
 def test_nothing_gapes_that_did_not(given: tuple[Any, ...]) -> None:
     scene, pieces, owner, tolerance = given
-    mesh = joined(scene, pieces, with_owner(owner), tolerance)
+    mesh = join_pieces(scene, pieces, with_owner(owner), tolerance)
     assert len(gaping(scene, corners_of(mesh))) == 0
     assert len(gaping(scene, piece_corners(scene, pieces))) > 0, "cutting alone leaves gaps"
 
@@ -217,7 +217,7 @@ def owners(corner: np.ndarray, who: Callable[[np.ndarray, np.ndarray], np.ndarra
 def test_a_floor_of_two_cells_is_two_rectangles(quads: Any) -> None:
     scene, corner, source = floor_in_pieces(quads, (1, 2, 3))
     owner = owners(corner, lambda x, z: x > 2)
-    mesh = joined(scene, all_cut(corner, source, owner), owner, scene.tolerance)
+    mesh = join_pieces(scene, all_cut(corner, source, owner), owner, scene.tolerance)
     assert np.bincount(mesh.triangle_cell[:, 0]).tolist() == [2, 2]
     assert len(mesh.vertex) == 6
 
@@ -225,7 +225,7 @@ def test_a_floor_of_two_cells_is_two_rectangles(quads: Any) -> None:
 def test_a_floor_that_is_there_twice_stays_so(quads: Any) -> None:
     scene, corner, source = floor_in_pieces(quads, (1, 2, 3), times=2)
     owner = owners(corner, lambda x, z: x > 2)
-    mesh = joined(scene, all_cut(corner, source, owner), owner, scene.tolerance)
+    mesh = join_pieces(scene, all_cut(corner, source, owner), owner, scene.tolerance)
     area = areas(corners_of(mesh))
     assert np.bincount(mesh.triangle_cell[:, 0], area).tolist() == pytest.approx([4, 4])
     assert len(mesh.triangle) < len(corner)
@@ -244,7 +244,7 @@ def test_halves_of_another_look_stay_apart(quads: Any) -> None:
         {"uv": shifted},
     ):
         apart = replace(scene, **other)
-        mesh = joined(apart, all_cut(corner, source, owner), owner, scene.tolerance)
+        mesh = join_pieces(apart, all_cut(corner, source, owner), owner, scene.tolerance)
         # Of each a triangle and a quadrilateral.
         assert np.bincount(mesh.triangle_source).tolist() == [3, 3], other
 
@@ -257,7 +257,7 @@ def test_a_cell_in_the_middle_leaves_a_hole(quads: Any) -> None:
         return np.where((x > 3) & (z > 0.5), -1, inner)
 
     owner = owners(corner, who)
-    mesh = joined(scene, all_cut(corner, source, owner), owner, scene.tolerance)
+    mesh = join_pieces(scene, all_cut(corner, source, owner), owner, scene.tolerance)
     cell, area = mesh.triangle_cell[:, 0], areas(corners_of(mesh))
     assert np.bincount(cell, area).tolist() == pytest.approx([3, 0.5])
     # Six corners around, one of which is a corner of the hole, and three more of that.
@@ -273,7 +273,7 @@ def test_what_cells_own_is_counted(quads: Any) -> None:
     back = owners(corner, lambda x, z: np.where(x > 3, -1, 2))[:, 1]
     owner = np.stack([front, back], axis=1)
     two_sided = np.array([True, False])
-    mesh = joined(
+    mesh = join_pieces(
         replace(scene, two_sided=two_sided), all_cut(corner, source, owner), owner, scene.tolerance
     )
     assert (mesh.visible, mesh.owners) == (2, 3 + 2)
@@ -330,7 +330,7 @@ def test_texture_coordinates_stay(given: tuple[Any, ...]) -> None:
     """At random points of the joined pieces, texture coordinates are those of some triangle of the
     model there, of the same material."""
     scene, pieces, owner, tolerance = given
-    mesh = joined(scene, pieces, owner, tolerance)
+    mesh = join_pieces(scene, pieces, owner, tolerance)
     rng = np.random.default_rng(5)
     some = rng.choice(len(mesh.triangle), 200)
     weight = rng.dirichlet([1, 1, 1], len(some))
