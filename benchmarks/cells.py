@@ -69,7 +69,7 @@ def area_row(name: str, scene: Scene, area: float) -> str:
 
 def joined_row(name: str, scene: Scene) -> str:
     """The triangles of a model before and after joining."""
-    with patch.object(subdivision, "joined", wraps=subdivision.joined) as joined:
+    with patch.object(subdivision, "join_pieces", wraps=subdivision.join_pieces) as joined:
         cells = subdivide(scene)
     _, pieces, owner, _ = joined.call_args.args
     front, back = owner.T
