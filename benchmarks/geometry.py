@@ -42,7 +42,7 @@ from ptmtools.output.gltf_compressed import MESHOPT
 from ptmtools.output.grid import COARSEST
 from ptmtools.output.model import TextureRecord, WriterOptions
 from ptmtools.scene import Scene, ingest
-from ptmtools.site.geometry import lean_glb
+from ptmtools.site.conversion import lean_glb
 
 GLTFPACK = Package("gltfpack", "1.3.0", "gltfpack")
 MESHOPTIMIZER = Package("meshoptimizer", "1.3.0", "meshoptimizer")

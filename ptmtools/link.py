@@ -63,7 +63,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
             else:
                 document = schemas.read(data, schemas.TRACE)
         except schemas.ShapeError as fault:
-            raise _refused(fault.message, fault.place or None) from None
+            raise _trace_error(fault.message, fault.place or None) from None
         trace = Trace(
             tuple(
                 Step(**{name: step[name] for name in _COLUMNS if name in step})
@@ -71,7 +71,7 @@ def read_trace(path: str | PathLike[str]) -> Trace:
             )
         )
         if not any(step.bandwidth != 0 for step in trace.steps):
-            raise _refused("the bandwidth of every step is 0", "steps")
+            raise _trace_error("the bandwidth of every step is 0", "steps")
         return trace
 
 
@@ -102,7 +102,7 @@ def _table(data: bytes) -> dict[str, Any]:
     }
 
 
-def _refused(problem: str, place: str | None) -> InputError:
+def _trace_error(problem: str, place: str | None) -> InputError:
     return InputError(
         "PTM-I710",
         f"no trace of a network: {problem}",

@@ -50,7 +50,7 @@ class Waits:
 
     def __init__(self, waited: Floats, busy: Floats | None = None) -> None:
         busy = np.zeros((0, 2)) if busy is None else busy
-        self._spans = _merged(np.concatenate([waited, busy]))
+        self._spans = _merge_spans(np.concatenate([waited, busy]))
         self._ends = np.sort(waited[:, 1])
 
     def until(self, moment: float) -> float:
@@ -98,13 +98,13 @@ class Browser:
 
     def __post_init__(self) -> None:
         cells, problem = len(self.record_bytes), ""
-        least, most = self.cell.min(initial=-1), self.cell.max(initial=-1)
+        least, greatest = self.cell.min(initial=-1), self.cell.max(initial=-1)
         if any(
             f.kind not in KINDS or (f.number >= cells and f.kind not in ("preview", "mesh"))
             for f in self.files
         ):
             problem = "a file that cannot be"
-        elif len(self.geometry_bytes) != cells or not -1 <= least <= most < cells:
+        elif len(self.geometry_bytes) != cells or not -1 <= least <= greatest < cells:
             problem = f"a cell that is none of {cells}"
         if problem:
             raise InputError("PTM-I801", f"the recording of a browser has {problem}")
@@ -146,7 +146,7 @@ def browser_of(recorded: Mapping[str, Any], time: Floats) -> Browser:
     )
 
 
-def _merged(spans: Floats) -> Floats:
+def _merge_spans(spans: Floats) -> Floats:
     """Merges overlapping (m, 2) intervals of time."""
     intervals: list[list[float]] = []
     for begin, end in sorted(spans.tolist()):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats
 from ptmtools.output.served import Served
-from ptmtools.site.opening import Views, contents_of, ordered_steps
+from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps
 from ptmtools_lab.catalogue import Catalogue
 
 #: Kind, number and end of each part, in order.
@@ -37,7 +37,7 @@ def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Flo
     if away > NEAR or aside < ALIKE:
         return ()
     try:
-        needs = Views(served).needs(view)
+        needs = NeedFinder(served).needs(view)
     except ImportError:
         return ()
     sizes = {

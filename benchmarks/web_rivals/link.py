@@ -6,7 +6,7 @@ page pays for its own handshakes and heads. The model, for each connection:
 - a handshake takes one round trip: bytes sent earlier by the browser count as sent after it;
 - every byte takes half a round trip in either direction; requests take no bandwidth;
 - all bytes to the browser share one bandwidth; connections with bytes to send get equal shares, in
-  pieces (`ptmtools.site.throttle.Link`);
+  pieces (`ptmtools.site.throttle.SharedLink`);
 - TCP's slow start (RFC 5681, RFC 6928): at first `WINDOW` bytes may be on their way, and as many
   more as were acknowledged. No packet is lost, so the window only grows.
 
@@ -30,7 +30,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.site.throttle import Link, Throttle
+from ptmtools.site.throttle import SharedLink, Throttle
 
 #: Bytes of TCP's initial window: ten segments.
 WINDOW = 10 * 1460
@@ -88,7 +88,7 @@ class _Proxy:
     def __init__(self, port: int, link: Throttle, traffic: Traffic) -> None:
         self._port, self._traffic = port, traffic
         self._half = link.latency / 2
-        self._link = Link(Throttle(link.bandwidth))
+        self._link = SharedLink(Throttle(link.bandwidth))
         self._tasks: set[asyncio.Task[None]] = set()
         self.over = asyncio.Event()
 

@@ -27,9 +27,8 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.folder_kinds import check_folder, folder_kind
 from ptmtools.quantities import count, size
-from ptmtools.site.about import folder_of
+from ptmtools.site.about import element_tags, folder_of, frame_tag
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.embedding import element_tags, frame_tag
 from ptmtools.site.forms import OPTIONS, form_site, form_weight
 from ptmtools.site.lookup import files_of
 from ptmtools.site.program import ELEMENT

@@ -3,16 +3,19 @@ icons of a site that a visitor installs.
 
 Open Graph (https://ogp.me) and the web application manifest (https://www.w3.org/TR/appmanifest).
 Programs that show links need absolute URLs, so the address of the site is an option. Nothing in a
-site keeps search engines away.
+site keeps search engines away. Last, the HTML by which another page shows a walk
+(docs/formats/embedding.md).
 """
 
 from __future__ import annotations
 
 import io
 import json
+from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha384
 from html import escape
 from typing import Any
 
@@ -27,6 +30,10 @@ _GROUND, _WALL, _LIGHT = (22, 23, 27), (58, 61, 70), (255, 199, 102)
 _FINER = 2
 #: Places that a description names.
 _PLACES = 6
+#: Stands for the address of a site that is unknown.
+UNKNOWN = "https://SITE/"
+#: What a page in a frame of another origin may use only with permission.
+ALLOWED = "fullscreen; gamepad; xr-spatial-tracking; clipboard-write"
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,7 @@ def folder_of(address: str) -> str:
     return f"{address.rstrip('/')}/" if address else ""
 
 
-def described(
+def description_of(
     viewpoints: Sequence[Mapping[str, Any]], rename: Callable[[str], str] = lambda name: name
 ) -> str:
     """The places of a building as a description; ``rename``: their names in the model → those that
@@ -126,3 +133,24 @@ def _property(name: str, text: str) -> str:
 
 def _content(text: str) -> str:
     return f'content="{escape(text)}"'
+
+
+def frame_tag(title: str, address: str = "") -> str:
+    """A frame that shows a site, of a page's ``title``. ``address``: of its folder, with a slash at
+    the end."""
+    return (
+        f'<iframe src="{escape(address or UNKNOWN)}" title="{escape(title)}" '
+        f'allow="{ALLOWED}" loading="lazy" width="960" height="540"></iframe>'
+    )
+
+
+def element_tags(title: str, script: str, data: bytes, address: str = "") -> str:
+    """The element ``<ptm-walk>`` and its script, of this name and contents. Browsers do not run a
+    script with other contents (W3C Subresource Integrity)."""
+    site = escape(address or UNKNOWN)
+    digest = b64encode(sha384(data).digest()).decode()
+    return (
+        f'<script type="module" src="{site}{script}" integrity="sha384-{digest}" '
+        f'crossorigin="anonymous"></script> '
+        f'<ptm-walk src="{site}" title="{escape(title)}"></ptm-walk>'
+    )

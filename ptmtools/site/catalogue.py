@@ -71,7 +71,7 @@ nav li { display: inline-block; margin-inline-end: 1rem; }
 
 
 @dataclass(frozen=True)
-class Content:
+class CatalogueContent:
     """The content of a catalogue.
 
     Attributes
@@ -99,7 +99,7 @@ def page_name(language: str, languages: Sequence[str]) -> str:
     return "catalogue.html" if language == languages[0] else f"catalogue-{language}.html"
 
 
-def catalogue_of(content: Content) -> dict[str, str]:
+def catalogue_of(content: CatalogueContent) -> dict[str, str]:
     """The pages, file → HTML; the first is in the default language."""
     languages = content.tour["languages"]
     return {page_name(tag, languages): _Page(content, tag).html() for tag in languages}
@@ -108,14 +108,14 @@ def catalogue_of(content: Content) -> dict[str, str]:
 class _Page:
     """A page of the catalogue in one language."""
 
-    def __init__(self, content: Content, language: str) -> None:
+    def __init__(self, content: CatalogueContent, language: str) -> None:
         self._content, self._tour, self._language = content, content.tour, language
         self._words = words_of(language)["catalogue"]
-        own = self._plain(content.tour.get("title")) or content.title
+        title = self._plain(content.tour.get("title")) or content.title
         #: What marks words of the page that exist only in English.
         self._foreign = "" if has_words(language) else ' lang="en" dir="ltr"'
         word = "" if self._foreign else f": {self._words['catalogue']}"
-        self._title = own + word
+        self._title = title + word
         self._h1 = (self._span(content.tour.get("title")) or escape(content.title)) + escape(word)
 
     def html(self) -> str:
@@ -142,7 +142,7 @@ class _Page:
             f'<!doctype html>\n<html lang="{escape(language)}" dir="{direction}">\n<head>\n'
             '<meta charset="utf-8">\n<meta name="viewport" content="width=device-width, '
             f'initial-scale=1">\n{GENERATOR}\n<title>{escape(self._title)}</title>\n'
-            f"{self._about()}{alternates}"
+            f"{self._preview_tags()}{alternates}"
             f'<link rel="icon" href="data:,">\n<style>{_STYLE}</style>\n'
             f"{self._linked_data()}</head>\n<body>\n"
             f'<a class="skip" href="#content">{self._word("skip")}</a>\n'
@@ -164,7 +164,7 @@ class _Page:
         text = escape(self._words[name])
         return f"<span{self._foreign}>{text}</span>" if self._foreign else text
 
-    def _about(self) -> str:
+    def _preview_tags(self) -> str:
         """What link previews and search engines read."""
         about = About(self._title, self._plain(self._tour.get("description")))
         return "".join(f"{line}\n" for line in about.texts())

@@ -5,7 +5,7 @@ and a site that changes is never half old. The index is that of the hints, with 
 each file instead of templates: a client plans with the sizes of records and geometry.
 The page itself is filled in by `ptmtools.site.program`.
 
-The geometry stays GLB, without what the page does not read (`ptmtools.site.geometry`).
+The geometry stays GLB, without what the page does not read (`ptmtools.site.conversion`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any
 from urllib.parse import quote, unquote
 
 from ptmtools.errors import DatabaseError, InputError, Rebuild
 from ptmtools.files import open_regular
-from ptmtools.options import option
 from ptmtools.output.emission import compressed
 from ptmtools.output.emitter import SiteTextures
 from ptmtools.output.emitters import is_other_form, texture_forms
@@ -31,11 +30,10 @@ from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
+from ptmtools.site.conversion import lean_glb, web_texture, without_exact
 from ptmtools.site.entry import Entry
 from ptmtools.site.files import DATA, Files
-from ptmtools.site.front import Front
-from ptmtools.site.geometry import lean_glb
-from ptmtools.site.textures import web_texture, without_exact
+from ptmtools.site.front import Front, SiteOptions as SiteOptions
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
@@ -56,66 +54,6 @@ _MAGIC = (
 )
 #: Fields of a texture that the hints of earlier releases lack.
 _NEEDED = {"gpuTexelBytes", "differences", "color"}
-
-
-@dataclass(frozen=True)
-class SiteOptions:
-    """Options of `site_of`."""
-
-    heading: ClassVar[str] = "Site"
-
-    title: str = option(
-        "", "Title of the page. Default: that of the tour, or the name of the database."
-    )
-    poster: str = option(
-        "",
-        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a rendered image "
-        "from the first viewpoint.",
-        metavar="FILE",
-    )
-    description: str = option(
-        "",
-        "Description of the site for search engines and link previews. Default: that of the "
-        "tour, or the first places.",
-    )
-    address: str = option(
-        "",
-        "Address of the site, such as https://example.org/walk/: link previews and search engines "
-        "get absolute URLs.",
-        metavar="URL",
-    )
-    pictures: bool = option(True, "Render a poster and images of the viewpoints.")
-    exact: Literal["built", "never"] = option(
-        "built",
-        "Levels of the textures: as built, or never the exact ones where a preview has the finest "
-        "level, for a site of a few megabytes.",
-    )
-    preview: bool = option(
-        True, "Include the previews; without them, only levels that exist as images have one."
-    )
-    opening: bool = option(
-        True,
-        "Write openings: each is one file with everything small that a viewpoint needs, which the "
-        "page fetches together with its program. The first viewpoint has one, others while they "
-        "add little to the site.",
-    )
-    tour: str = option(
-        "",
-        "Labels and stops (docs/formats/tour.md), or none. Default: tour.json in the folder that "
-        "contains the database, if it exists.",
-        metavar="FILE",
-    )
-    offline: bool = option(
-        False,
-        "Let browsers keep what a visitor has seen, so that the walk works without a network "
-        "(docs/formats/offline.md). The host needs https.",
-    )
-    clients: Literal["page", "vrml"] = option(
-        "page",
-        "Clients that the site supports: page (only its own page) or vrml (also VRML browsers, "
-        "which adds files).",
-        name="for",
-    )
 
 
 @dataclass(frozen=True)
@@ -203,12 +141,12 @@ class _Builder:
             openings,
         )
 
-        def toured() -> Site:
+        def build_with_tour() -> Site:
             files = Files(dict(self._files.entries), list(self._files.notes))
             title = front.add(files)
-            return Site(files.entries, index, tuple(files.notes), title, toured)
+            return Site(files.entries, index, tuple(files.notes), title, build_with_tour)
 
-        return toured()
+        return build_with_tour()
 
     def _openings(self, index: Mapping[str, Any]) -> tuple[str, ...]:
         """The URLs of the openings of the first viewpoints; none where Embree is missing."""
@@ -233,8 +171,8 @@ class _Builder:
             return ()
         mark = sha256("".join(map(sha256, data)).encode())
         return tuple(
-            f"{DATA}/{self._files.add('opening', f'-{number}.bin', OPENING, one, mark=mark)}"
-            for number, one in enumerate(data)
+            f"{DATA}/{self._files.add('opening', f'-{number}.bin', OPENING, opening, mark=mark)}"
+            for number, opening in enumerate(data)
         )
 
     def _cells(self) -> Iterator[dict[str, Any]]:
@@ -334,7 +272,7 @@ class _Builder:
             poster = self._files.add("poster", suffix, media, data)
         if self._options.pictures:
             self._progress(0, 1, "pictures")
-            both = self._files.rendered(lambda: _viewpoints(self._served), self._folder.path)
+            both = self._files.render(lambda: _viewpoints(self._served), self._folder.path)
             drawn, small = both or (b"", [])
             if drawn and not poster:
                 poster = self._files.add("poster", ".jpg", JPEG, drawn)
@@ -354,9 +292,9 @@ class _Builder:
         for name in sorted(self._digests):
             media = _VRML_MEDIA.get(Path(name).suffix)
             if media and name.startswith(f"{SERVED}/"):
-                own = quote(name.removeprefix(f"{SERVED}/"))
-                self._files.entries[own] = Entry(
-                    own, self._folder.path / name, media, compressed=own.endswith(".wrl")
+                url = quote(name.removeprefix(f"{SERVED}/"))
+                self._files.entries[url] = Entry(
+                    url, self._folder.path / name, media, compressed=url.endswith(".wrl")
                 )
 
     def _place(self, url: str) -> tuple[Path, str]:

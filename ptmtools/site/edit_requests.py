@@ -130,11 +130,11 @@ class Editing:
             raise _RefusedError(
                 405 if any(name == known for _, known in answers) else 404, "not known"
             )
-        most, answer = answers[request.method, name]
+        limit, answer = answers[request.method, name]
         if request.method != "GET":
             _check_origin(request)
             _check_type(request)
-        body = await _body(request, most)
+        body = await _body(request, limit)
         try:
             document = await run_in_threadpool(answer, request, body)
         except StaleError:
@@ -158,11 +158,11 @@ class Editing:
             )
 
     def _tour(self, request: Request, body: bytes) -> Any:
-        document, tag = self.editor.loaded()
+        document, tag = self.editor.load()
         return {
             "document": document,
             "tag": tag,
-            "shown": self.editor.shown(json.dumps(document).encode()),
+            "shown": self.editor.page_document(json.dumps(document).encode()),
             "file": str(self.editor.file),
             "rooms": self.editor.rooms(),
             "places": self.editor.places(),
@@ -178,7 +178,7 @@ class Editing:
         return {"shown": shown, "tag": after}
 
     def _preview(self, request: Request, body: bytes) -> Any:
-        return {"shown": self.editor.shown(body)}
+        return {"shown": self.editor.page_document(body)}
 
     def _pick(self, request: Request, body: bytes) -> Any:
         try:
@@ -188,7 +188,7 @@ class Editing:
             raise _RefusedError(422, "not a ray") from None
         if not math.hypot(*direction):
             raise _RefusedError(422, "not a ray: its direction has no length")
-        return {"picks": self.editor.picked(eye, direction)}
+        return {"picks": self.editor.pick(eye, direction)}
 
 
 def _status(fault: PtmError) -> int:
@@ -229,13 +229,13 @@ def _check_type(request: Request) -> None:
         raise _RefusedError(415, "the document has to be application/json")
 
 
-async def _body(request: Request, most: int) -> bytes:
-    """The body of a request, of at most ``most`` bytes."""
+async def _body(request: Request, limit: int) -> bytes:
+    """The body of a request, of at most ``limit`` bytes."""
     parts, size = [], 0
     async for part in request.stream():
         size += len(part)
-        if size > most:
-            raise _RefusedError(413, f"more than {most:,} bytes")
+        if size > limit:
+            raise _RefusedError(413, f"more than {limit:,} bytes")
         parts.append(part)
     return b"".join(parts)
 

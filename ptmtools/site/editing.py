@@ -22,9 +22,9 @@ from ptmtools.site.entry import Entry, stamp_of, state_of
 from ptmtools.site.tours import TourPlacer
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.tour.model import FORMAT, NAME, SCHEMA, Tour
-from ptmtools.tour.picking import picked
+from ptmtools.tour.pictures import pick_objects
 from ptmtools.tour.reading import CAPTIONS, LARGEST, SOUNDS, content_of, document_of, tour_of
-from ptmtools.tour.writing import formatted, rewritten
+from ptmtools.tour.writing import format_json, rewrite
 
 #: Folder of sounds and captions in the addresses of the server.
 MEDIA = "edit/media"
@@ -59,7 +59,7 @@ class TourEditor:
         self._refuse_read_only()
         data = self._read()
         if data is not None:
-            self.shown(data)
+            self.page_document(data)
 
     def _open(self) -> None:
         self._stamp = self._state()
@@ -83,7 +83,7 @@ class TourEditor:
                     remedy="change its permissions, or copy the database to a folder of your own",
                 )
 
-    def loaded(self) -> tuple[dict[str, Any], str]:
+    def load(self) -> tuple[dict[str, Any], str]:
         """The document, a new one if there is none, and its tag; raises as `read_tour`."""
         data = self._read()
         if data is None:
@@ -104,14 +104,14 @@ class TourEditor:
     def _read(self) -> bytes | None:
         return content_of(self.file, LARGEST) if os.path.lexists(self.file) else None
 
-    def shown(self, data: bytes) -> dict[str, Any]:
+    def page_document(self, data: bytes) -> dict[str, Any]:
         """A tour as the page shows it, with sounds below `MEDIA`.
 
         Raises as `read_tour` and `Placing.anchors`; InputError: PTM-I870 of another model.
         """
-        return self._placed(tour_of(data, self.file))
+        return self._place(tour_of(data, self.file))
 
-    def _placed(self, tour: Tour) -> dict[str, Any]:
+    def _place(self, tour: Tour) -> dict[str, Any]:
         if tour.model and tour.model != self._model:
             raise InputError(
                 "PTM-I870",
@@ -121,7 +121,7 @@ class TourEditor:
                 remedy="move it elsewhere, or correct its model",
             )
         with naming(self.file):
-            return self._current().placed(tour, self._media_name)
+            return self._current().page_document(tour, self._media_name)
 
     def _current(self) -> TourPlacer:
         """Of the database as it is: it may have been built again."""
@@ -137,7 +137,7 @@ class TourEditor:
         ------
         StaleError: the file has another tag.
         OutputError: PTM-O002, O003 it cannot be written.
-        and as `shown`.
+        and as `page_document`.
         """
         with naming(self.file):
             document = document_of(data)
@@ -146,20 +146,22 @@ class TourEditor:
             if (ABSENT if before is None else tag_of(before)) != tag:
                 raise StaleError
             if before is None:
-                text = formatted(document) + "\n"
+                text = format_json(document) + "\n"
             else:
-                text = rewritten(before.decode(), document)
+                text = rewrite(before.decode(), document)
             after = text.encode()
-            shown = self.shown(after)
+            shown = self.page_document(after)
             if after != before:
                 write_bytes(self.file, after, force=True)
         return shown, tag_of(after)
 
-    def picked(self, eye: Sequence[float], direction: Sequence[float]) -> list[dict[str, Any]]:
-        """The objects on a ray, see `ptmtools.tour.picking`."""
+    def pick(self, eye: Sequence[float], direction: Sequence[float]) -> list[dict[str, Any]]:
+        """The objects on a ray, see `pick_objects`."""
         placer = self._current()
         start, along = np.array(eye, np.float64), np.array(direction, np.float64)
-        return [asdict(p) for p in picked(placer.scene, placer.placing.pictures, start, along)]
+        return [
+            asdict(p) for p in pick_objects(placer.scene, placer.placing.pictures, start, along)
+        ]
 
     def rooms(self) -> list[str]:
         """The names that labels of rooms may have."""
@@ -181,20 +183,20 @@ class TourEditor:
     def _files(self, suffixes: Mapping[str, str]) -> Iterator[str]:
         count = 0
         for number, (folder, folders, names) in enumerate(os.walk(self._folder)):
-            here = Path(folder)
-            depth = len(here.relative_to(self._folder).parts)
+            path = Path(folder)
+            depth = len(path.relative_to(self._folder).parts)
             if number >= _MOST_FOLDERS:
                 return
             # Databases and hidden folders hold none.
             folders[:] = sorted(
                 name
                 for name in folders
-                if depth < _DEEPEST and name[0] != "." and not (here / name / MANIFEST).exists()
+                if depth < _DEEPEST and name[0] != "." and not (path / name / MANIFEST).exists()
             )
             for name in sorted(names):
                 if Path(name).suffix.lower() in suffixes and name[0] != "." and count < _MOST_FILES:
                     count += 1
-                    yield (here / name).relative_to(self._folder).as_posix()
+                    yield (path / name).relative_to(self._folder).as_posix()
 
     def _media_name(self, file: Path, media: str) -> str:
         state = state_of(file.stat())

@@ -51,17 +51,17 @@ class Files:
         ``mark``: what its name has of that instead."""
         digest = sha256(source) if isinstance(source, bytes) else digest
         # Names with a mark differ in their ends.
-        own = _STRANGE.sub("_", stem)[: None if mark else 64]
-        name = f"{own}-{(mark or digest)[:DIGITS]}{suffix}"
+        cleaned = _STRANGE.sub("_", stem)[: None if mark else 64]
+        name = f"{cleaned}-{(mark or digest)[:DIGITS]}{suffix}"
         state = state_of(source.stat()) if isinstance(source, Path) else None
         self.put(Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest))
         return name
 
-    def rendered(self, render: Callable[[], T], database: Path) -> T | None:
+    def render(self, draw: Callable[[], T], database: Path) -> T | None:
         """Pictures of a database; None, and a note, where Embree is missing. Raises DatabaseError
         in place of InputError."""
         try:
-            return render()
+            return draw()
         except ImportError:
             self.note("no pictures: embreex, which renders them, is not installed")
             return None

@@ -7,15 +7,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Literal
 
+from ptmtools.options import option
 from ptmtools.output.served import Served
-from ptmtools.site.about import About, described, folder_of
-from ptmtools.site.catalogue import ANGLE, Content, catalogue_of
+from ptmtools.site.about import About, description_of, folder_of
+from ptmtools.site.catalogue import ANGLE, CatalogueContent, catalogue_of
 from ptmtools.site.entry import Entry
 from ptmtools.site.files import DATA, Files, add_manifest
 from ptmtools.site.program import (
     HTML,
+    add_policy,
     address_of,
     element,
     page,
@@ -23,12 +25,68 @@ from ptmtools.site.program import (
     registration,
     worker,
 )
-from ptmtools.site.security import secured
 from ptmtools.site.tours import SiteTour, site_tour
 from ptmtools.store.folder import DatabaseFolder
 
-if TYPE_CHECKING:
-    from ptmtools.site.content import SiteOptions
+
+@dataclass(frozen=True)
+class SiteOptions:
+    """Options of `ptmtools.site.content.site_of`."""
+
+    heading: ClassVar[str] = "Site"
+
+    title: str = option(
+        "", "Title of the page. Default: that of the tour, or the name of the database."
+    )
+    poster: str = option(
+        "",
+        "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a rendered image "
+        "from the first viewpoint.",
+        metavar="FILE",
+    )
+    description: str = option(
+        "",
+        "Description of the site for search engines and link previews. Default: that of the "
+        "tour, or the first places.",
+    )
+    address: str = option(
+        "",
+        "Address of the site, such as https://example.org/walk/: link previews and search engines "
+        "get absolute URLs.",
+        metavar="URL",
+    )
+    pictures: bool = option(True, "Render a poster and images of the viewpoints.")
+    exact: Literal["built", "never"] = option(
+        "built",
+        "Levels of the textures: as built, or never the exact ones where a preview has the finest "
+        "level, for a site of a few megabytes.",
+    )
+    preview: bool = option(
+        True, "Include the previews; without them, only levels that exist as images have one."
+    )
+    opening: bool = option(
+        True,
+        "Write openings: each is one file with everything small that a viewpoint needs, which the "
+        "page fetches together with its program. The first viewpoint has one, others while they "
+        "add little to the site.",
+    )
+    tour: str = option(
+        "",
+        "Labels and stops (docs/formats/tour.md), or none. Default: tour.json in the folder that "
+        "contains the database, if it exists.",
+        metavar="FILE",
+    )
+    offline: bool = option(
+        False,
+        "Let browsers keep what a visitor has seen, so that the walk works without a network "
+        "(docs/formats/offline.md). The host needs https.",
+    )
+    clients: Literal["page", "vrml"] = option(
+        "page",
+        "Clients that the site supports: page (only its own page) or vrml (also VRML browsers, "
+        "which adds files).",
+        name="for",
+    )
 
 
 @dataclass(frozen=True)
@@ -73,8 +131,8 @@ class Front:
             first = self.index["cells"][viewpoints[0]["cell"]]
             preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
         views = dict(zip(self.openings, map(address_of, viewpoints), strict=False))
-        own = self.options.description or (tour and tour.text("description"))
-        description = own or described(viewpoints, *([tour.place] if tour else []))
+        written = self.options.description or (tour and tour.text("description"))
+        description = written or description_of(viewpoints, *([tour.place] if tour else []))
         head = [*About(title, description, self.poster, self.options.address).lines()]
         if self.options.offline:
             files.put(worker())
@@ -108,18 +166,18 @@ class Front:
         if not tour.document["labels"]:
             return settings
         pages = catalogue_of(self._catalogue(tour, title, files))
-        for own, html in pages.items():
-            files.put(Entry(own, secured(html).encode(), HTML, compressed=True))
+        for name, html in pages.items():
+            files.put(Entry(name, add_policy(html).encode(), HTML, compressed=True))
         return settings | {"catalogue": next(iter(pages))}
 
-    def _catalogue(self, tour: SiteTour, title: str, files: Files) -> Content:
+    def _catalogue(self, tour: SiteTour, title: str, files: Files) -> CatalogueContent:
         stops: dict[int, Mapping[str, Any]] = {}
         for stop in tour.document["stops"]:
             if "label" in stop:
                 stops.setdefault(stop["label"], stop | {"fieldOfView": ANGLE})
         pictures: dict[int, str] = {}
         if self.options.pictures and stops:
-            works = files.rendered(lambda: self._works([*stops.values()]), self.folder.path)
+            works = files.render(lambda: self._works([*stops.values()]), self.folder.path)
             for number, data in zip(stops, works or (), strict=False):
                 id = tour.document["labels"][number]["id"]
                 pictures[number] = f"{DATA}/{files.add(f'work-{id}', '.jpg', 'image/jpeg', data)}"
@@ -127,7 +185,9 @@ class Front:
         for viewpoint in self.served.index["viewpoints"]:
             rooms.setdefault(viewpoint["cell"], viewpoint["description"])
         address = folder_of(self.options.address)
-        return Content(tour.document, title, rooms, pictures, tour.transcripts, f"{DATA}/", address)
+        return CatalogueContent(
+            tour.document, title, rooms, pictures, tour.transcripts, f"{DATA}/", address
+        )
 
     def _works(self, views: Sequence[Mapping[str, Any]]) -> list[bytes]:
         from ptmtools.site.pictures import WORK, pictures_of

@@ -62,12 +62,12 @@ def name_of(path: bytes) -> str | None:
     return name if name.count("/") + 1 == len(steps) and leads_inside(name) else None
 
 
-def among(entries: Mapping[str, Entry]) -> Lookup:
+def entry_lookup(entries: Mapping[str, Entry]) -> Lookup:
     """The entries of a site, by their names."""
     return {unquote(name): entry for name, entry in entries.items()}.get
 
 
-def below(folder: Path, *, hashed: bool = False) -> Lookup:
+def folder_lookup(folder: Path, *, hashed: bool = False) -> Lookup:
     """The regular files below a folder; links are followed as long as they stay there.
 
     With ``hashed``, names with a hash as `ptm publish` writes it may be kept for ever.
@@ -99,9 +99,9 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
     """
     path = Path(folder)
     if (path / INDEX).is_file() and not (path / DATABASE).exists():
-        return below(path, hashed=True)
+        return folder_lookup(path, hashed=True)
     if kind := folder_kind(path):
-        return among(form_site(path, kind).entries)
+        return entry_lookup(form_site(path, kind).entries)
     return _Database(path)
 
 
@@ -114,8 +114,8 @@ class _Database:
         self._lock = Lock()
         self._stamps = self._database_stamp(), self._tour_stamp()
         self._site = self._new_site()
-        self._find = among(self._site.entries)
-        self._others = below(path / SERVED)
+        self._find = entry_lookup(self._site.entries)
+        self._others = folder_lookup(path / SERVED)
 
     def __call__(self, name: str) -> Entry | None:
         if name == INDEX:
@@ -137,7 +137,7 @@ class _Database:
                     raise BlockingIOError("the database is being built, or damaged") from None
             # A tour with an error leaves the one before it, and is reported once.
             self._stamps = stamps
-            self._find = among(self._site.entries)
+            self._find = entry_lookup(self._site.entries)
 
     def _database_stamp(self) -> tuple[int, ...]:
         """That of the manifest, which changes when a stage is finished."""

@@ -81,7 +81,7 @@ class Needs:
     detail: Mapping[int, float]
 
 
-class Views:
+class NeedFinder:
     """Computes the needs of viewpoints. Raises ImportError without Embree."""
 
     def __init__(self, served: Served) -> None:
@@ -96,28 +96,28 @@ class Views:
         eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
         sight = self._caster.look(camera, eye, direction)
         hit = np.flatnonzero(sight.triangle >= 0)
-        triangle, each = sight.triangle[hit], 1 / len(sight.triangle)
+        triangle, pixel_share = sight.triangle[hit], 1 / len(sight.triangle)
         cells, counts = np.unique(triangles.cell[triangle], return_counts=True)
         textures, finest = {}, {}
         for texture in np.unique(triangles.texture[triangle]).tolist():
             if texture < 0:
                 continue
-            own = hit[triangles.texture[triangle] == texture]
+            pixels = hit[triangles.texture[triangle] == texture]
             sizes = sizes_of(self._textures[texture])
             width, height = (side << FINER for side in sizes[-1])
-            moves = footprints(sight, own, triangles)[1]
+            moves = footprints(sight, pixels, triangles)[1]
             detail = detail_of_pixels(moves, width, height) - FINER
             finest[texture] = float(np.quantile(detail, FEW))
             # A pixel requires level n by max(0, min(1, N - n - λ)).
             level = np.arange(len(sizes))
             required = len(sizes) - level - np.clip(detail, 0, len(sizes) - 1)[:, None]
-            textures[texture] = each * np.clip(required, 0, 1).sum(axis=0)
-        shares = dict(zip(cells.tolist(), (each * counts).tolist(), strict=True))
+            textures[texture] = pixel_share * np.clip(required, 0, 1).sum(axis=0)
+        shares = dict(zip(cells.tolist(), (pixel_share * counts).tolist(), strict=True))
         return Needs(shares, textures, finest)
 
 
 @dataclass(frozen=True)
-class Step:
+class OpeningStep:
     """A part of an opening, or a preview that follows it.
 
     Attributes
@@ -137,7 +137,7 @@ class Step:
 
 def texture_steps(
     number: int, row: Mapping[str, Any], share: Floats, first: int, detail: float = 0.0
-) -> list[Step]:
+) -> list[OpeningStep]:
     """The steps of a texture, in their order, up to one that shows what the view needs; ``first``
     is the number of its first preview, ``detail``: see `Needs`."""
     sizes, ends, previews = sizes_of(row), row["ends"], row.get("previews", ())
@@ -158,13 +158,13 @@ def texture_steps(
         sources.append((worth, preview["bytes"], "preview", first + place, column))
         if column >= needed:
             break
-    steps: list[Step] = []
-    shown, held, present = 0.0, 0, 0
+    steps: list[OpeningStep] = []
+    shown, loaded, present = 0.0, 0, 0
     while True:
         best: tuple[float, int, tuple[float, int, str, int, int]] | None = None
         for source in sources:
             worth, end, kind, _, _ = source
-            length = end - held if kind == "texture" else end
+            length = end - loaded if kind == "texture" else end
             if worth <= shown or length <= 0:
                 continue
             density = (worth - shown) / (length + OVERHEAD)
@@ -175,23 +175,23 @@ def texture_steps(
         density, length, (worth, end, kind, place, column) = best
         # Half as many lines need one level less.
         lines = math.floor(LINES * 2.0 ** (detail - (len(sizes) - present))) if present else 0
-        steps.append(Step(kind, place, end, length, density, lines))
-        shown, held, present = worth, end if kind == "texture" else held, max(present, column)
+        steps.append(OpeningStep(kind, place, end, length, density, lines))
+        shown, loaded, present = worth, end if kind == "texture" else loaded, max(present, column)
         if column >= needed:
             return steps
 
 
 def ordered_steps(
     index: Mapping[str, Any], needs: Needs, cell: int, sizes: Mapping[tuple[str, int], int]
-) -> list[Step]:
+) -> list[OpeningStep]:
     """The steps of a view, the record and the geometry of its ``cell`` first, then by worth per
     byte; ``sizes``: bytes of records and geometry by (kind, cell)."""
     textures = index["textures"]
     first = [0, *accumulate(len(row.get("previews", ())) for row in textures)]
 
-    def whole(kind: str, number: int, worth: float) -> Step:
+    def whole(kind: str, number: int, worth: float) -> OpeningStep:
         length = sizes[kind, number]
-        return Step(kind, number, length, length, worth / length)
+        return OpeningStep(kind, number, length, length, worth / length)
 
     steps = [
         whole("geometry", number, NOTHING * share)
@@ -209,7 +209,7 @@ def ordered_steps(
     return [whole("record", cell, np.inf), whole("geometry", cell, np.inf), *steps]
 
 
-def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[Step]]:
+def contents_of(steps: Sequence[OpeningStep]) -> tuple[list[OpeningStep], list[OpeningStep]]:
     """The parts of the file, and the previews that follow it."""
     ends = {step.number: step.end for step in steps if step.kind == "texture"}
     parts, later = [], []
@@ -224,7 +224,7 @@ def contents_of(steps: Sequence[Step]) -> tuple[list[Step], list[Step]]:
     return parts, later
 
 
-def packed_opening(steps: Sequence[Step], read: Callable[[str, int, int], bytes]) -> bytes:
+def packed_opening(steps: Sequence[OpeningStep], read: Callable[[str, int, int], bytes]) -> bytes:
     """The file; ``read`` returns the bytes of the file of a kind and number up to an end, as gzip
     packs those of cells."""
     contents, later = contents_of(steps)
@@ -253,7 +253,7 @@ def openings_of(
 
     Raises ImportError without Embree.
     """
-    views, cells = Views(served), index["cells"]
+    views, cells = NeedFinder(served), index["cells"]
     sizes = {
         (kind, number): int(row[f"{kind}Bytes"])
         for number, row in enumerate(cells)
@@ -261,19 +261,19 @@ def openings_of(
     }
 
     @cache
-    def packed(kind: str, number: int, end: int) -> bytes:
+    def pack(kind: str, number: int, end: int) -> bytes:
         whole = kind in ("record", "geometry")
         return compressed(read(kind, number, None)) if whole else read(kind, number, end)
 
-    left = size * REPEATED
+    repeatable = size * REPEATED
     # The page shows all views with the angle of the first.
     angle = {"fieldOfView": index["viewpoints"][0]["fieldOfView"]}
     for number, viewpoint in enumerate(index["viewpoints"][:MOST]):
         needs = views.needs({**viewpoint, **angle})
         steps = ordered_steps(index, needs, viewpoint["cell"], sizes)
-        data = packed_opening(steps, packed)
+        data = packed_opening(steps, pack)
         if number:
-            left -= len(data)
-            if left < 0:
+            repeatable -= len(data)
+            if repeatable < 0:
                 return
         yield data

@@ -40,7 +40,7 @@ from ptmtools.texture.model import Limits
 
 
 @dataclass(frozen=True)
-class Kind:
+class PictureKind:
     """A kind of picture: width and height in pixels, the bytes that it may have, and the texels of
     the longer side of the finest level that is sampled."""
 
@@ -49,10 +49,10 @@ class Kind:
     finest: int = 256
 
 
-POSTER = Kind((640, 360), 12_000)
-SMALL = Kind((160, 90), 3_000)
+POSTER = PictureKind((640, 360), 12_000)
+SMALL = PictureKind((160, 90), 3_000)
 #: Of a work.
-WORK = Kind(PICTURE, 40_000, 512)
+WORK = PictureKind(PICTURE, 40_000, 512)
 #: Rays for a pixel, each way.
 _FINER = 1.5
 #: Viewpoints that have a picture at most.
@@ -71,12 +71,14 @@ def pictures(served: Served) -> tuple[bytes, list[bytes]]:
     """JPEGs of a database's viewpoints: a poster of the first, and small ones of the first `MOST`;
     raises as `pictures_of`."""
     viewpoints = served.index["viewpoints"][:MOST]
-    views = [(POSTER, viewpoints[0]), *((SMALL, each) for each in viewpoints)]
+    views = [(POSTER, viewpoints[0]), *((SMALL, viewpoint) for viewpoint in viewpoints)]
     poster, *small = pictures_of(served, views)
     return poster, small
 
 
-def pictures_of(served: Served, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
+def pictures_of(
+    served: Served, views: Sequence[tuple[PictureKind, Mapping[str, Any]]]
+) -> Iterator[bytes]:
     """JPEGs of views: position, direction and fieldOfView as those of viewpoints.
 
     Raises
@@ -86,15 +88,15 @@ def pictures_of(served: Served, views: Sequence[tuple[Kind, Mapping[str, Any]]])
     """
     scene = _Scene(served)
     rays = np.cumsum([math.prod(_rays(kind.size)) for kind, _ in views])
-    for _, group in groupby(zip(rays // _TOGETHER, views, strict=True), lambda each: each[0]):
-        yield from scene.drawn([view for _, view in group])
+    for _, group in groupby(zip(rays // _TOGETHER, views, strict=True), lambda row: row[0]):
+        yield from scene.draw([view for _, view in group])
 
 
 @dataclass(frozen=True)
 class _View:
     """The surfaces of a picture, and the layers before them."""
 
-    kind: Kind
+    kind: PictureKind
     sight: Sight
     layers: Sequence[Layer]
 
@@ -132,17 +134,17 @@ class _Scene:
         self._vertex_colors = surfaces.vertex_colors
         self._caster, self._layers = Caster(surfaces, transparent_of(surfaces)), Layers(surfaces)
 
-    def drawn(self, views: Sequence[tuple[Kind, Mapping[str, Any]]]) -> Iterator[bytes]:
+    def draw(self, views: Sequence[tuple[PictureKind, Mapping[str, Any]]]) -> Iterator[bytes]:
         """The pictures of some views, with the textures that they show in memory."""
         textures = _Textures(self._served, max(kind.finest for kind, _ in views))
         frames = [self._view(kind, view, textures) for kind, view in views]
-        shown = np.unique(np.concatenate([each.triangles() for each in frames]))
-        drawn = [each for each in (self._triangles, self._light) if each]
-        numbers = (each.texture[shown[shown >= 0]].tolist() for each in drawn)
-        textures.read({number for each in numbers for number in each} - {-1})
+        shown = np.unique(np.concatenate([frame.triangles() for frame in frames]))
+        meshes = [mesh for mesh in (self._triangles, self._light) if mesh]
+        numbers = (mesh.texture[shown[shown >= 0]].tolist() for mesh in meshes)
+        textures.read({number for group in numbers for number in group} - {-1})
         yield from ordered(partial(self._jpeg, textures), frames, _THREADS)
 
-    def _view(self, kind: Kind, view: Mapping[str, Any], textures: _Textures) -> _View:
+    def _view(self, kind: PictureKind, view: Mapping[str, Any], textures: _Textures) -> _View:
         sight = _look(self._caster, kind.size, view)
         sight, layers = self._layers.before(sight, partial(_alpha, self._triangles, textures))
         return _View(kind, sight, layers)
@@ -158,8 +160,8 @@ class _Scene:
         return colors
 
 
-def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
-    """A JPEG of the (n, 3) colours of rays, of at most ``most`` bytes if the lowest quality allows
+def jpeg(colors: Floats, size: tuple[int, int], limit: int) -> bytes:
+    """A JPEG of the (n, 3) colours of rays, of at most ``limit`` bytes if the lowest quality allows
     it."""
     from PIL import Image
 
@@ -171,7 +173,7 @@ def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
         out = io.BytesIO()
         image.save(out, "JPEG", quality=quality, optimize=True, progressive=True)
         data = out.getvalue()
-        if len(data) <= most:
+        if len(data) <= limit:
             break
     return data
 
@@ -198,16 +200,16 @@ def _levels(served: Served, finest: int, texture: int) -> Levels:
     if count > len(row["ends"]):
         fine = (n for n, preview in enumerate(row["previews"]) if preview["level"] >= count - 1)
         alpha = row["components"] in (2, 4)
-        return _shown(row, read_preview(served, texture, next(fine), alpha=alpha)[:count])
+        return _with_offsets(row, read_preview(served, texture, next(fine), alpha=alpha)[:count])
     colors: list[NDArray[np.uint8]] = []
     with open_ptm(served.texture_file(texture), limits=_LIMITS) as ptm:
         for samples in islice(ptm.levels(), count):
             colors.append(in_colors(samples))
-    return _shown(row, colors)
+    return _with_offsets(row, colors)
 
 
-def _shown(row: Mapping[str, Any], levels: Levels) -> Levels:
-    return [with_offset(*each) for each in zip(levels, offsets_of(row), strict=False)]
+def _with_offsets(row: Mapping[str, Any], levels: Levels) -> Levels:
+    return [with_offset(*pair) for pair in zip(levels, offsets_of(row), strict=False)]
 
 
 def _colors(
@@ -226,9 +228,9 @@ def _colors(
     lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
     _sample(lit, sight, hit, triangles, textures)
     if light is not None:
-        each = np.full_like(lit, 255.0)
-        _sample(each, sight, hit, light, textures)
-        lit *= to_srgb(each / 255)
+        lightmap = np.full_like(lit, 255.0)
+        _sample(lightmap, sight, hit, light, textures)
+        lit *= to_srgb(lightmap / 255)
     shown[hit] = lit * triangles.color[triangle]
     return shown
 
@@ -241,7 +243,7 @@ def _sample(
     for number, levels in textures.items():
         rows = np.flatnonzero(texture == number)
         if len(rows):
-            colors[rows] = _sampled(sight, hit[rows], triangles, levels)[:, :3]
+            colors[rows] = _sample_texels(sight, hit[rows], triangles, levels)[:, :3]
 
 
 def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:
@@ -250,11 +252,11 @@ def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:
     for number in np.unique(texture).tolist():
         if textures[number][0].shape[2] > 3:
             rows = np.flatnonzero(texture == number)
-            result[rows] = _sampled(sight, rows, triangles, textures[number])[:, 3] / 255
+            result[rows] = _sample_texels(sight, rows, triangles, textures[number])[:, 3] / 255
     return result
 
 
-def _sampled(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:
+def _sample_texels(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:
     """(n, 3) colours that some pixels show of a texture, or (n, 4) with alpha."""
     uv, moves = footprints(sight, pixel, triangles)
     height, width = levels[-1].shape[:2]

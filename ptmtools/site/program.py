@@ -1,18 +1,25 @@
-"""The page and its program, as ``web/page/build.py`` leaves them in ``page/``."""
+"""The page and its program, as ``web/page/build.py`` leaves them in ``page/``, and the policy of
+the page.
+
+The Content-Security-Policy is written into the page: static hosts send no such header. A page runs
+the scripts of its own site and those whose digests are listed, and nothing else, even if a text of
+the site were markup. It connects to its own site only.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import html
 import json
 import math
 import re
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import InputError
 from ptmtools.site.entry import DIGITS, Entry
-from ptmtools.site.security import secured
 from ptmtools.site.words import LANGUAGES, words_of
 from ptmtools.store.layout import sha256
 
@@ -38,6 +45,10 @@ ELEMENT = "ptm-walk.js"
 WORKER = "offline.js"
 #: The page of other forms, and their scripts (`ptmtools.site.forms`).
 FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js", "campus.js")
+#: Scripts and styles in the page; data blocks have a type and do not run.
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+_STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
+_CHARSET = '<meta charset="utf-8">\n'
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
 
 
@@ -46,7 +57,7 @@ def program_files() -> dict[str, Entry]:
 
     Raises InputError: PTM-I122 one is missing.
     """
-    data = {name: _built(name) for name in PROGRAM}
+    data = {name: _read_built(name) for name in PROGRAM}
     digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
     return {
         name: Entry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
@@ -56,10 +67,10 @@ def program_files() -> dict[str, Entry]:
 
 def script_file(name: str) -> bytes:
     """The bytes of a script that is not among the files of a site; raises as `program_files`."""
-    return _built(name)
+    return _read_built(name)
 
 
-def _built(name: str) -> bytes:
+def _read_built(name: str) -> bytes:
     try:
         return (PAGE / name).read_bytes()
     except OSError as fault:
@@ -113,17 +124,17 @@ def page(
         "poster": f'<img id="poster" src="{poster}" alt="">' if poster else "",
         "catalogue": f'<p><a href="{catalogue}">{html.escape(works)}</a></p>' if catalogue else "",
     }
-    return _filled(INDEX, settings, script, links, fields)
+    return _fill(INDEX, settings, script, links, fields)
 
 
 def element() -> Entry:
     """The script of ``<ptm-walk>``, for pages that embed the walk; its name never changes."""
-    return Entry(ELEMENT, _built(ELEMENT), JAVASCRIPT, compressed=True)
+    return Entry(ELEMENT, _read_built(ELEMENT), JAVASCRIPT, compressed=True)
 
 
 def worker() -> Entry:
     """The service worker; browsers look for a new one under the same name."""
-    return Entry(WORKER, _built(WORKER), JAVASCRIPT, compressed=True)
+    return Entry(WORKER, _read_built(WORKER), JAVASCRIPT, compressed=True)
 
 
 def registration(program: Mapping[str, Entry]) -> str:
@@ -134,19 +145,19 @@ def registration(program: Mapping[str, Entry]) -> str:
 
 def form_script(name: str) -> Entry:
     """A script of `FORM_SCRIPTS`, in a folder named by its contents; raises as `program_files`."""
-    data = _built(name)
+    data = _read_built(name)
     return Entry(f"viewer-{sha256(data)[:DIGITS]}/{name}", data, JAVASCRIPT, True, compressed=True)
 
 
 def form_page(
     settings: Mapping[str, Any], script: str, about: Sequence[str], *, framed: bool
 ) -> Entry:
-    """The page of a single object, filled in; raises as `page`. ``framed``: see `secured`."""
+    """The page of a single object, filled in; raises as `page`. ``framed``: see `add_policy`."""
     links = [f'<link rel="preload" as="fetch" href="{settings["index"]}" crossorigin>', *about]
-    return _filled(FORM_PAGE, settings, script, links, {}, framed=framed)
+    return _fill(FORM_PAGE, settings, script, links, {}, framed=framed)
 
 
-def _filled(
+def _fill(
     template: str,
     settings: Mapping[str, Any],
     script: str,
@@ -165,5 +176,38 @@ def _filled(
         "script": script,
         **fields,
     }
-    filled = _FIELD.sub(lambda match: values[match[1]], _built(template).decode())
-    return Entry(INDEX, secured(filled, framed=framed).encode(), HTML, compressed=True)
+    filled = _FIELD.sub(lambda match: values[match[1]], _read_built(template).decode())
+    return Entry(INDEX, add_policy(filled, framed=framed).encode(), HTML, compressed=True)
+
+
+def add_policy(page: str, *, framed: bool = False) -> str:
+    """A page with its policy, at the beginning of its head. ``framed``: it shows documents of
+    others in frames, which inherit the policy; their styles, fonts and sounds are in them."""
+    begin, charset, rest = page.partition(_CHARSET)
+    policy = policy_of(page, framed=framed)
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+    return begin + charset + meta + rest
+
+
+def policy_of(page: str, *, framed: bool = False) -> str:
+    """The policy of a page. One without scripts of its own runs none."""
+    scripts, styles = (
+        [f"'sha256-{_digest(text)}'" for text in kind.findall(page)] for kind in (_SCRIPT, _STYLE)
+    )
+    rules = {"default-src": ["'none'"]}
+    if '<script type="module"' in page:
+        rules["script-src"] = ["'self'", "'wasm-unsafe-eval'", *scripts]
+        rules["worker-src"] = rules["connect-src"] = ["'self'"]
+    rules["style-src"] = ["'unsafe-inline'"] if framed else styles
+    rules["img-src"] = ["'self'", "data:", "blob:"]
+    rules["media-src"] = ["'self'", "data:"] if framed else ["'self'"]
+    if framed:
+        rules["font-src"] = ["data:"]
+    if '<link rel="manifest"' in page:
+        rules["manifest-src"] = ["'self'"]
+    rules["base-uri"] = rules["form-action"] = ["'none'"]
+    return "; ".join(f"{name} {' '.join(values)}" for name, values in rules.items() if values)
+
+
+def _digest(text: str) -> str:
+    return b64encode(hashlib.sha256(text.encode()).digest()).decode()

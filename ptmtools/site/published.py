@@ -104,7 +104,7 @@ def _headers(entries: Iterable[Entry]) -> bytes:
             rules[f"/{MANIFEST}"].append(f"Content-Type: {entry.media}")
         if entry.media == GLB:
             rules[f"/{folder}/*.glb"] = [f"Content-Type: {GLB}"]
-    lines = (f"{path}\n" + "".join(f"  {one}\n" for one in rules[path]) for path in rules)
+    lines = (f"{path}\n" + "".join(f"  {rule}\n" for rule in rules[path]) for path in rules)
     return "".join(lines).encode()
 
 

@@ -87,7 +87,7 @@ def publish(
     if is_url(target):
         return upload(site, str(target), options, force=force, progress=progress)
     root = Path(target)
-    before = _checked(root, force)
+    before = _check_folder(root, force)
     files = dict(plain_files(site, options))
     names = [name for step in steps_of(files) for name in step]
     for name in names:
@@ -104,7 +104,7 @@ def publish(
     for number, name in enumerate(names):
         progress(number, len(names), "files")
         (digest,) = now[name]
-        if _held(root, name) != digest:
+        if _digest_in(root, name) != digest:
             _write(root, name, files[name], digest)
             written[name] = None
     old = dict.fromkeys(name for step in steps_of_removal(before, now, options) for name in step)
@@ -115,7 +115,7 @@ def publish(
     return Published(tuple(written), unchanged, removed)
 
 
-def _checked(root: Path, force: bool) -> Digests:
+def _check_folder(root: Path, force: bool) -> Digests:
     """The list of a folder; empty for a new one, or one that was forced."""
     if root.exists() and not root.is_dir():
         raise OutputError(
@@ -156,11 +156,11 @@ def _write_list(root: Path, files: Digests) -> None:
     rows = {name: " ".join(digests) for name, digests in sorted(files.items())}
     document = {"format": FORMAT, "schema": SCHEMA, "files": rows}
     data = (json.dumps(document, indent=0, ensure_ascii=False) + "\n").encode()
-    if _held(root, LIST) != sha256(data):
+    if _digest_in(root, LIST) != sha256(data):
         write_bytes(root / LIST, data, force=True)
 
 
-def _held(root: Path, name: str) -> str | None:
+def _digest_in(root: Path, name: str) -> str | None:
     """The SHA-256 of a file of the folder, None if it does not exist."""
     file = real_file(root, name)
     if file is None:
@@ -189,7 +189,7 @@ def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
 
 def _remove(root: Path, name: str, digests: Collection[str]) -> bool:
     """Removes a file, and its folder if that is empty; False if others have changed the file."""
-    if _held(root, name) not in digests:
+    if _digest_in(root, name) not in digests:
         return False
     with writing(root / name):
         (root / name).unlink()
@@ -231,7 +231,7 @@ def weight_of(site: Site) -> Weight:
     used = {kind.script for kind in listed(index)}
     used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
-    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _walked(n, used)}
+    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, used)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
     before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
@@ -247,7 +247,7 @@ def weight_of(site: Site) -> Weight:
     )
 
 
-def _walked(name: str, used: Collection[str]) -> bool:
+def _is_walked(name: str, used: Collection[str]) -> bool:
     """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
     script = name.rpartition("/")[2]
     later = (script in LATER and script not in used) or is_other_form(name)

@@ -100,7 +100,7 @@ def app_of(
 def _response(request: Request, entry: Entry, copies: Copies, common: dict[str, str]) -> Response:
     """The response to a request for an existing file; raises as `opened`."""
     asked = request.headers
-    file, size, tag = opened(entry)
+    file, size, tag = open_entry(entry)
     headers = common | {
         "Content-Type": entry.media,
         "Cache-Control": entry.caching,
@@ -166,7 +166,7 @@ def accepts_gzip(accept_encoding: str | None) -> bool:
     return chosen.strip("0.") != ""
 
 
-def opened(entry: Entry) -> tuple[BinaryIO, int, str]:
+def open_entry(entry: Entry) -> tuple[BinaryIO, int, str]:
     """The bytes of an entry as an open file, their number, and a strong entity tag, of these bytes
     and no others: a name that changes with the content, a hash, or the time of the file.
 

@@ -20,7 +20,7 @@ from ptmtools.errors import InputError
 from ptmtools.options import option
 from ptmtools.quantities import parse_bandwidth, parse_duration
 from ptmtools.site.entry import Entry
-from ptmtools.site.lookup import Lookup, among
+from ptmtools.site.lookup import Lookup, entry_lookup
 from ptmtools.site.throttle import Throttle, Visits
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def serving(
     """
     from ptmtools.site.responses import app_of
 
-    lookup = among(files) if isinstance(files, Mapping) else files
+    lookup = entry_lookup(files) if isinstance(files, Mapping) else files
     lookup = editing.lookup(lookup) if editing else lookup
     app: ASGIApp = app_of(lookup, throttle=throttle, visits=visits, origin=origin)
     if editing:

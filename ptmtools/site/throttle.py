@@ -6,10 +6,10 @@ comes in pieces. Each flow has one piece on the link at a time, in turn; a piece
 flow's share of `PIECE` seconds. So each flow receives one every 10 ms, whatever the bandwidth, as
 browsers expect of a link; the shares of a second differ from the fluid's by less than a hundredth.
 
-`Link` has no clock: callers pass the time. Pieces are booked one after another, each from the
-moment at which the one before it is through. A late timer of a busy server therefore costs nothing:
-what could have left meanwhile leaves at once. A client that is slow to read loses its share of the
-meantime, beyond `LATE`.
+`SharedLink` has no clock: callers pass the time. Pieces are booked one after another, each from
+the moment at which the one before it is through. A late timer of a busy server therefore costs
+nothing: what could have left meanwhile leaves at once. A client that is slow to read loses its
+share of the meantime, beyond `LATE`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Flow:
         self.ready, self.late = ready, 0.0
 
 
-class Link:
+class SharedLink:
     """The link; its flows exist from `open` to `close`."""
 
     def __init__(self, throttle: Throttle) -> None:
@@ -64,7 +64,7 @@ class Link:
         self._free = 0.0
 
     @property
-    def shared_by(self) -> int:
+    def flow_count(self) -> int:
         """Number of responses under way."""
         return len(self._flowing)
 
@@ -73,20 +73,20 @@ class Link:
         ``ready``."""
         return Flow(now + self.throttle.latency)
 
-    def book(self, flow: Flow, left: int, now: float) -> tuple[int, float]:
-        """Put the next of ``left`` bytes on the link.
+    def book(self, flow: Flow, remaining: int, now: float) -> tuple[int, float]:
+        """Put the next of ``remaining`` bytes on the link.
 
         Returns their number, at least one, and the moment, s, at which they are through and more
         may be booked. ValueError if none are left.
         """
-        if left < 1:
+        if remaining < 1:
             raise ValueError("nothing is left to send")
         self._flowing.add(flow)
         if self._rate == math.inf:
             flow.ready = max(flow.ready, now)
-            return left, flow.ready
+            return remaining, flow.ready
         share = self._rate * PIECE / len(self._flowing)
-        piece = left if left <= share else max(1, math.floor(share))
+        piece = remaining if remaining <= share else max(1, math.floor(share))
         self._free = flow.ready = max(self._free, flow.ready, now - LATE) + piece / self._rate
         return piece, flow.ready
 
@@ -96,7 +96,7 @@ class Link:
 
 
 @dataclass
-class Visit:
+class Exchange:
     """A request and its response.
 
     Attributes
@@ -124,7 +124,7 @@ class Visit:
     whole: bool = False
 
 
-class Visits(list[Visit]):
+class Visits(list[Exchange]):
     """Requests in the order of their arrival. The server's thread adds to it, others read it; a
     visit may change until it has ended."""
 
@@ -143,7 +143,7 @@ class Paced:
 
     def __init__(self, app: ASGIApp, throttle: Throttle, visits: Visits | None) -> None:
         self._app = app
-        self.link = Link(throttle)
+        self.link = SharedLink(throttle)
         self._visits = visits
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -154,36 +154,36 @@ class Paced:
         asked = dict(scope["headers"]).get(b"range")
         path = scope["raw_path"].decode("ascii")
         text = None if asked is None else asked.decode("latin-1")
-        visit = Visit(scope["method"], path, text, now)
+        visit = Exchange(scope["method"], path, text, now)
         if self._visits is not None:
             self._visits.append(visit)
         flow = self.link.open(now)
 
-        async def paced(message: Message) -> None:
+        async def send_paced(message: Message) -> None:
             if message["type"] == "http.response.start":
                 await self._start(flow, visit, message, send)
             else:
                 await self._body(flow, visit, message, send)
 
         try:
-            await self._app(scope, receive, paced)
+            await self._app(scope, receive, send_paced)
         finally:
             self.link.close(flow)
             if not visit.whole:
                 visit.ended = time.monotonic()
 
-    async def _start(self, flow: Flow, visit: Visit, message: Message, send: Send) -> None:
-        head = left = _HEAD + sum(len(n) + len(v) + 4 for n, v in message["headers"])
-        flow.late = await _until(flow.ready)
-        while left:
-            left -= await self._piece(flow, left)
+    async def _start(self, flow: Flow, visit: Exchange, message: Message, send: Send) -> None:
+        head = remaining = _HEAD + sum(len(n) + len(v) + 4 for n, v in message["headers"])
+        flow.late = await _wait_until(flow.ready)
+        while remaining:
+            remaining -= await self._piece(flow, remaining)
         length = dict(message["headers"]).get(b"content-length")
         visit.length = None if length is None else int(length)
         visit.status, visit.header_bytes = message["status"], head
         visit.first_byte = time.monotonic()
         await send(message)
 
-    async def _body(self, flow: Flow, visit: Visit, message: Message, send: Send) -> None:
+    async def _body(self, flow: Flow, visit: Exchange, message: Message, send: Send) -> None:
         body, more = memoryview(message.get("body", b"")), message.get("more_body", False)
         while True:
             piece = await self._piece(flow, len(body)) if body else 0
@@ -197,14 +197,14 @@ class Paced:
             if not body:
                 return
 
-    async def _piece(self, flow: Flow, left: int) -> int:
-        """Number of bytes, of ``left``, that are through next."""
-        piece, through = self.link.book(flow, left, time.monotonic() - flow.late)
-        flow.late = await _until(through)
+    async def _piece(self, flow: Flow, remaining: int) -> int:
+        """Number of bytes, of ``remaining``, that are through next."""
+        piece, through = self.link.book(flow, remaining, time.monotonic() - flow.late)
+        flow.late = await _wait_until(through)
         return piece
 
 
-async def _until(moment: float) -> float:
+async def _wait_until(moment: float) -> float:
     """Wait for a moment of `time.monotonic`; other tasks run even if it is past. Returns by how
     many seconds it is."""
     await asyncio.sleep(max(0.0, moment - time.monotonic()))

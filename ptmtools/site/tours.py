@@ -5,8 +5,10 @@ The page fetches the document after its first view, with a script that only site
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +22,18 @@ from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.tour.captions import transcript_of
 from ptmtools.tour.markdown import nodes_of
 from ptmtools.tour.model import NAME, Label, Texts, Tour, in_language
-from ptmtools.tour.placing import Anchor, Placing, unknown
+from ptmtools.tour.placing import Anchor, Placing, unknown_name_error
 from ptmtools.tour.reading import CAPTIONS, SOUNDS, read_tour
 
 #: A file of the tour, and its media type → its URL, relative to the document.
 NameOf = Callable[[Path, str], str]
 #: The choice of no tour.
 NONE = "none"
+#: Lines of captions (WebVTT) with times, and markup in them.
+_TIMES = re.compile(r"^\s*(?:\d+:)?\d\d:\d\d\.\d{3}\s+-->")
+_MARKUP = re.compile(r"<[^>]*>")
 
 
 def tour_file(database: Path, choice: str) -> Path | None:
@@ -88,7 +92,7 @@ def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[Sit
     if tour.model and tour.model != model and not choice:
         return None, f"{file} is the tour of {tour.model}, not of {model}: left out"
     with naming(file):
-        document = TourPlacer(folder).placed(tour, name_of)
+        document = TourPlacer(folder).page_document(tour, name_of)
     transcripts: dict[int, Texts] = {
         number: {
             tag: transcript_of(file.read_text("utf-8-sig")) for tag, file in label.captions.items()
@@ -97,6 +101,18 @@ def site_tour(folder: DatabaseFolder, choice: str, name_of: NameOf) -> tuple[Sit
         if label.captions
     }
     return SiteTour(document, transcripts), ""
+
+
+def transcript_of(captions: str) -> str:
+    """The lines of all cues of captions, without times, markup, notes and styles, for visitors who
+    read instead of listening."""
+    lines: list[str] = []
+    for block in re.split(r"\n\s*\n", captions.replace("\r\n", "\n").replace("\r", "\n")):
+        rows = block.split("\n")
+        start = next((k for k, row in enumerate(rows) if _TIMES.match(row)), None)
+        if start is not None:
+            lines += (unescape(_MARKUP.sub("", row)).strip() for row in rows[start + 1 :])
+    return " ".join(filter(None, lines))
 
 
 class TourPlacer:
@@ -110,16 +126,16 @@ class TourPlacer:
         self._cells: Cells = artifacts[CELLS]
         self.placing = Placing(self.scene)
 
-    def placed(self, tour: Tour, name_of: NameOf) -> dict[str, Any]:
+    def page_document(self, tour: Tour, name_of: NameOf) -> dict[str, Any]:
         """The document of a tour on the page; raises as `Placing.anchors`, and PTM-I302 no place
-        has a name of `Tour.renamed`."""
+        has a name of `Tour.new_names`."""
         places = self.placing.anchors(tour)
         markers = np.array([place.marker for place in places]).reshape(-1, 3)
-        renamed = tour.renamed
-        known = self.place_names() if renamed else ()
-        for name in renamed:
+        new_names = tour.new_names
+        known = self.place_names() if new_names else ()
+        for name in new_names:
             if name not in known:
-                raise unknown("place", name, known, f"places.{name}")
+                raise unknown_name_error("place", name, known, f"places.{name}")
         return _document(tour, places, self._cells.locate(markers).tolist(), name_of)
 
     def place_names(self) -> tuple[str, ...]:
@@ -143,7 +159,7 @@ def _document(
         }
         for stop in tour.stops
     ]
-    walk = {"title": tour.title, "description": tour.description, "places": tour.renamed}
+    walk = {"title": tour.title, "description": tour.description, "places": tour.new_names}
     return {
         "languages": list(tour.languages),
         **{name: texts for name, texts in walk.items() if texts},

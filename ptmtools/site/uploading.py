@@ -18,8 +18,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,7 @@ AT_ONCE = 16
 
 
 @dataclass(frozen=True)
-class Row:
+class ObjectRow:
     """An object in the list: SHA-256 of contents and headers, MD5 of the bytes, and its version;
     "" where unknown."""
 
@@ -61,16 +62,16 @@ class Row:
     md5: str
     version: str = ""
 
-    def is_of(self, held: Held | None) -> bool:
+    def is_of(self, present: Held | None) -> bool:
         """Whether the object in a listing has the bytes of this row."""
-        return held is not None and (
-            bool(self.version and self.version == held.version)
-            or bool(self.md5 and self.md5 == held.md5)
+        return present is not None and (
+            bool(self.version and self.version == present.version)
+            or bool(self.md5 and self.md5 == present.md5)
         )
 
 
 #: The rows of the list, by the names of the objects: one, and during a run also the next one.
-Rows = dict[str, tuple[Row, ...]]
+Rows = dict[str, tuple[ObjectRow, ...]]
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Item:
     entry: Entry
     body: bytes | Path
     headers: Headers
-    row: Row
+    row: ObjectRow
 
 
 def upload(
@@ -88,77 +89,82 @@ def upload(
 ) -> Published:
     """Writes a site to the objects below a URL, or brings them up to date; see `publish`."""
     objects = Objects(url)
-    held = objects.listing()
-    rows = _rows(objects, held, force)
+    present = objects.listing()
+    rows = _rows(objects, present, force)
 
-    def row_held(name: str) -> Row:
-        return _row_held(objects, name, held.get(name), rows[name])
+    def row_held(name: str) -> ObjectRow:
+        return _row_held(objects, name, present.get(name), rows[name])
 
     before = dict(zip(rows, ordered(row_held, rows, AT_ONCE), strict=True))
     # Headers take the place of gzip copies and of the file with caching rules.
-    files = (
-        {unquote(name): entry for name, entry in site.entries.items()}
-        if objects.kind
-        else dict(plain_files(site, options))
-    )
+    encode = objects.kind is not None
+    entries = {unquote(name): entry for name, entry in site.entries.items()}
+    files = entries if encode else dict(plain_files(site, options))
     steps = steps_of(files)
     names = [name for step in steps for name in step]
-    for name in names:
-        if name in held and name not in before and not force:
-            raise OutputError(
-                "PTM-O001",
-                "already exists and was not changed",
-                file=f"{objects.url}/{name}",
-                remedy="move it away, or use --force to replace it",
-            )
-    items = {name: _item(files[name], encode=objects.kind is not None) for name in names}
+    strangers = present.keys() - before.keys()
+    if not force and (name := next((name for name in names if name in strangers), "")):
+        raise OutputError(
+            "PTM-O001",
+            "already exists and was not changed",
+            file=f"{objects.url}/{name}",
+            remedy="move it away, or use --force to replace it",
+        )
+    items = {name: _item(files[name], encode=encode) for name in names}
 
     def current(name: str) -> bool:
         row = before.get(name)
-        return bool(row and row.sha256 == items[name].row.sha256 and row.is_of(held.get(name)))
+        return bool(row and row.sha256 == items[name].row.sha256 and row.is_of(present.get(name)))
 
     unchanged = tuple(name for name in names if current(name))
     changed = {*names} - {*unchanged}
     written = tuple(name for name in names if name in changed)
     # What is there under a name that only --force replaces is not ours: its row is empty.
-    unknown = {name: Row("", "") for name in written if name in held and name not in before}
+    unknown = {name: ObjectRow("", "") for name in written if name in strangers}
     both: Rows = {name: (row,) for name, row in (before | unknown).items()}
     both |= {name: (*both.get(name, ()), items[name].row) for name in written}
     if written:
         _write_list(objects, both)
 
-    def send(name: str) -> None:
-        item = items[name]
-        objects.write(name, item.body, item.headers)
-        if isinstance(item.body, Path):
-            with reading(item.body):
-                state = state_of(item.body.stat())
-            if item.entry.state not in (None, state):
-                raise damaged(item.body, "it changed while it was copied")
-
+    send = partial(_send, objects, items)
     # What replaces a former object waits for the new ones that it names, and the page for all.
     waves = [[name for name in step if name in changed] for step in steps]
     uploads = chain.from_iterable(ordered(send, wave, AT_ONCE) for wave in waves)
     for number, _ in enumerate(uploads):
         progress(number, len(written), "files")
     old = steps_of_removal(before, items, options)
-    waves = [[name for name in step if before[name].is_of(held.get(name))] for step in old]
-    removed = tuple(chain.from_iterable(waves))
+    waves = [[name for name in step if before[name].is_of(present.get(name))] for step in old]
     for wave in waves:
         list(ordered(objects.remove, wave, AT_ONCE))
     gone = {*changed, *chain.from_iterable(old)}
     after = {name: row for name, row in before.items() if name not in gone}
     if written:
-        listed = objects.listing()
-        after |= {
-            name: replace(items[name].row, version=listed[name].version)
-            for name in written
-            if name in listed
-        }
+        after |= _stored_rows(objects.listing(), items, written)
     final: Rows = {name: (row,) for name, row in after.items()}
     if final != rows:
         _write_list(objects, final)
-    return Published(written, unchanged, removed)
+    return Published(written, unchanged, tuple(chain.from_iterable(waves)))
+
+
+def _stored_rows(
+    listing: Mapping[str, Held], items: Mapping[str, Item], written: Iterable[str]
+) -> dict[str, ObjectRow]:
+    """The rows of the written objects that are listed, with their versions."""
+    return {
+        name: replace(items[name].row, version=listing[name].version)
+        for name in written
+        if name in listing
+    }
+
+
+def _send(objects: Objects, items: Mapping[str, Item], name: str) -> None:
+    item = items[name]
+    objects.write(name, item.body, item.headers)
+    if isinstance(item.body, Path):
+        with reading(item.body):
+            state = state_of(item.body.stat())
+        if item.entry.state not in (None, state):
+            raise damaged(item.body, "it changed while it was copied")
 
 
 def _item(entry: Entry, *, encode: bool) -> Item:
@@ -180,17 +186,17 @@ def _item(entry: Entry, *, encode: bool) -> Item:
         with reading(body):
             md5 = file_digest(body, "md5")
     text = json.dumps([digest, *asdict(headers).values()])
-    return Item(entry, body, headers, Row(sha256(text.encode()), md5))
+    return Item(entry, body, headers, ObjectRow(sha256(text.encode()), md5))
 
 
-def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> Rows:
+def _rows(objects: Objects, present: Mapping[str, Held], force: bool) -> Rows:
     """The list of an earlier publication; empty for a new one, or one that was forced.
 
     Raises OutputError PTM-O010 if other objects are there.
     """
-    if not held:
+    if not present:
         return {}
-    rows = _read_list(objects.read(LIST)) if LIST in held else None
+    rows = _read_list(objects.read(LIST)) if LIST in present else None
     if rows is None and not force:
         raise OutputError(
             "PTM-O010",
@@ -201,15 +207,17 @@ def _rows(objects: Objects, held: Mapping[str, Held], force: bool) -> Rows:
     return rows or {}
 
 
-def _row_held(objects: Objects, name: str, held: Held | None, rows: Sequence[Row]) -> Row:
+def _row_held(
+    objects: Objects, name: str, present: Held | None, rows: Sequence[ObjectRow]
+) -> ObjectRow:
     """The row whose bytes the object has; the first one if none fits. Only an interrupted run
     leaves an object without a version in the list: if the store gives no MD5, it is read."""
-    if held and not held.md5 and len(rows) + (not rows[0].version) > 1:
+    if present and not present.md5 and len(rows) + (not rows[0].version) > 1:
         md5 = hashlib.md5(objects.read(name), usedforsecurity=False).hexdigest()
-        held = replace(held, md5=md5)
+        present = replace(present, md5=md5)
     for row in reversed(rows):
-        if held and row.is_of(held):
-            return replace(row, version=held.version)
+        if present and row.is_of(present):
+            return replace(row, version=present.version)
     return rows[0]
 
 
@@ -228,11 +236,11 @@ def _read_list(data: bytes) -> Rows | None:
         return None
 
 
-def _valid(files: Mapping[str, Any]) -> Iterator[tuple[str, Row]]:
+def _valid(files: Mapping[str, Any]) -> Iterator[tuple[str, ObjectRow]]:
     for name, fields in files.items():
         parts = [fields["sha256"], fields["md5"], fields["version"]]
         if leads_inside(name) and name != LIST and all(isinstance(part, str) for part in parts):
-            yield name, Row(*parts)
+            yield name, ObjectRow(*parts)
 
 
 def _write_list(objects: Objects, rows: Rows) -> None:

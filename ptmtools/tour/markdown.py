@@ -56,19 +56,19 @@ def nodes_of(text: str) -> list[Node]:
 
     parser = MarkdownIt("commonmark", {"html": False, "maxNesting": 10 * DEEPEST})
     parser.disable(["image", "hr", "reference"])
-    return _Tree().of(parser.parse(text))
+    return _NodeBuilder().build(parser.parse(text))
 
 
-class _Tree:
-    """Collects the nodes of tokens."""
+class _NodeBuilder:
+    """Builds the nodes of tokens."""
 
     def __init__(self) -> None:
         self._open: list[list[Any]] = [[]]
 
-    def of(self, tokens: Iterable[Token]) -> list[Node]:
+    def build(self, tokens: Iterable[Token]) -> list[Node]:
         for token in tokens:
             if token.type == "inline":
-                self._open[-1].extend(_Tree().of(token.children or ()))
+                self._open[-1].extend(_NodeBuilder().build(token.children or ()))
             elif token.nesting > 0:
                 self._begin(token)
             elif token.nesting < 0:

@@ -87,7 +87,7 @@ class Tour:
     places: Mapping[str, Texts] = field(default_factory=dict)
 
     @property
-    def renamed(self) -> dict[str, Texts]:
+    def new_names(self) -> dict[str, Texts]:
         """`places` without those that keep the name of the model."""
         return {name: texts for name, texts in self.places.items() if {*texts.values()} != {name}}
 

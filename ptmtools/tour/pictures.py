@@ -31,10 +31,13 @@ _SHARE = 0.5
 #: Greatest distance of a picture from its wall; distance from a face behind which a ray starts; in
 #: metres. The most faces of the own object that a ray passes.
 _ON_WALL, _NEXT, _PASSED = 0.3, 1e-4, 16
+#: Distance of a marker before a surface that one points at, metres; the most objects that a ray
+#: picks, and the most surfaces that it meets.
+_MARKER_BEFORE, _PICKS, _SURFACES = 0.03, 8, 64
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureRectangle:
     """An upright rectangle around a flat part of an object, metres.
 
     Attributes
@@ -50,23 +53,23 @@ class Picture:
     height: float
 
     @property
-    def up(self) -> Floats:
+    def upward(self) -> Floats:
         """(3,) unit vector to its upper edge."""
-        up: Floats = np.cross(self.normal, self.right)
-        return up
+        upward: Floats = np.cross(self.normal, self.right)
+        return upward
 
 
 @dataclass(frozen=True)
-class _Part:
+class _FlatPart:
     """A picture of one material; whether it is flat; and its thickness if it could be seen from
     behind, else None."""
 
-    picture: Picture
+    picture: PictureRectangle
     flat: bool
     thickness: float | None
 
 
-class Pictures:
+class PictureFinder:
     """Finds the pictures of a scene."""
 
     def __init__(self, scene: Scene) -> None:
@@ -88,21 +91,21 @@ class Pictures:
         ray."""
         return first_face(self._tree, start - self._middle, along)
 
-    def of(self, own: Ints) -> Picture | None:
+    def picture_of(self, faces: Ints) -> PictureRectangle | None:
         """The picture that an object with the faces (n,) is; None if it is none."""
-        textured = own[self._textured[self._scene.triangle_material[own]]]
+        textured = faces[self._textured[self._scene.triangle_material[faces]]]
         if not len(textured):
             return None
-        points = self._scene.corners[own].reshape(-1, 3)
+        points = self._scene.corners[faces].reshape(-1, 3)
         parts = [part for part in self._parts(textured) if _fills(part.picture, points)]
         if not parts:
             return None
         best = max(parts, key=lambda part: (part.flat, part.picture.width * part.picture.height))
-        if best.thickness is None or not self._looks_at_a_wall(best, own):
+        if best.thickness is None or not self._looks_at_a_wall(best, faces):
             return best.picture
-        return _turned(best.picture, best.thickness)
+        return _other_side(best.picture, best.thickness)
 
-    def _parts(self, faces: Ints) -> Iterator[_Part]:
+    def _parts(self, faces: Ints) -> Iterator[_FlatPart]:
         """Those of each material of the faces."""
         material = self._scene.triangle_material[faces]
         for number in np.unique(material).tolist():
@@ -110,7 +113,7 @@ class Pictures:
             if part:
                 yield part
 
-    def _part(self, faces: Ints) -> _Part | None:
+    def _part(self, faces: Ints) -> _FlatPart | None:
         """The rectangle in the plane of the largest of the faces, if that is upright and nearly all
         that one sees of them."""
         corners = self._scene.corners[faces]
@@ -137,33 +140,77 @@ class Pictures:
             return None
         two = bool(self._scene.two_sided[faces[front]].any())
         back = two or float(size[behind].sum()) >= _MOST * shown
-        picture = Picture(centre, main, right, width, height)
-        return _Part(picture, flat, thickness if back else None)
+        picture = PictureRectangle(centre, main, right, width, height)
+        return _FlatPart(picture, flat, thickness if back else None)
 
-    def _looks_at_a_wall(self, part: _Part, own: Ints) -> bool:
+    def _looks_at_a_wall(self, part: _FlatPart, faces: Ints) -> bool:
         """Whether visitors see a part from behind: something is just before it, and nothing behind
         it; or out of the building before it."""
         picture = part.picture
-        before = self._free(picture.centre, picture.normal, own)
+        before = self._free(picture.centre, picture.normal, faces)
         behind = self._free(
-            picture.centre - picture.normal * (part.thickness or 0), -picture.normal, own
+            picture.centre - picture.normal * (part.thickness or 0), -picture.normal, faces
         )
         if (before < _ON_WALL) != (behind < _ON_WALL):
             return before < _ON_WALL
         return bool(np.isinf(before) and np.isfinite(behind))
 
-    def _free(self, start: Floats, along: Floats, own: Ints) -> float:
-        """The distance to the first face along a unit vector that is not among its own ones."""
+    def _free(self, start: Floats, along: Floats, faces: Ints) -> float:
+        """The distance along a unit vector to the first face that is not one of ``faces``."""
         away = _NEXT
         for _ in range(_PASSED):
             hit, step = self.first(start + away * along, along)
             if hit < 0:
                 return float("inf")
             away += step
-            if not (own == hit).any():
+            if not (faces == hit).any():
                 return away
             away += _NEXT
         return away
+
+
+@dataclass(frozen=True)
+class Pick:
+    """An object on a ray.
+
+    Attributes
+    ----------
+    object: its name, "" if it has none.
+    at: place of a marker just before it, world metres.
+    """
+
+    object: str
+    at: tuple[float, float, float]
+
+
+def pick_objects(
+    scene: Scene, pictures: PictureFinder, eye: Floats, direction: Floats
+) -> list[Pick]:
+    """The objects that a ray meets up to the first opaque one: glass, and the work behind it. Faces
+    with one side are met from their front only, as the page draws them.
+
+    Parameters
+    ----------
+    eye: (3,) world metres. direction: (3,) of any length but 0.
+    """
+    along = direction / np.linalg.norm(direction)
+    away, picks = 0.0, list[Pick]()
+    for _ in range(_SURFACES):
+        face, step = pictures.first(eye + away * along, along)
+        if face < 0 or len(picks) == _PICKS:
+            break
+        away += step
+        across = normals(scene.corners[face][None])[0]
+        if scene.two_sided[face] or across @ along < 0:
+            name = scene.objects[scene.triangle_object[face]]
+            if not any(name == pick.object for pick in picks):
+                at = eye + max(away - _MARKER_BEFORE, 0) * along
+                x, y, z = (round(float(value), 3) for value in at)
+                picks.append(Pick(name, (x, y, z)))
+            if not scene.materials[scene.triangle_material[face]].transparent:
+                break
+        away += _NEXT
+    return picks
 
 
 def first_face(tree: Any, start: Floats, along: Floats) -> tuple[int, float]:
@@ -178,14 +225,14 @@ def _span(points: Floats) -> tuple[Floats, Floats]:
     return flat.min(axis=0), flat.max(axis=0)
 
 
-def _fills(picture: Picture, points: Floats) -> bool:
+def _fills(picture: PictureRectangle, points: Floats) -> bool:
     """Whether a picture is a large part of its object, whose points are (n, 3)."""
-    low, high = _span(points @ np.stack([picture.right, picture.up, picture.normal], axis=1))
+    low, high = _span(points @ np.stack([picture.right, picture.upward, picture.normal], axis=1))
     width, height, _ = high - low
     return bool(picture.width >= _SHARE * width and picture.height >= _SHARE * height)
 
 
-def _turned(picture: Picture, thickness: float) -> Picture:
+def _other_side(picture: PictureRectangle, thickness: float) -> PictureRectangle:
     """The other side of a picture."""
     return replace(
         picture,

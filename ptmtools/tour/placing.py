@@ -16,7 +16,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from ptmtools.tour.model import Label, Tour
-from ptmtools.tour.pictures import Picture, Pictures
+from ptmtools.tour.pictures import PictureFinder, PictureRectangle
 
 #: Distance of a marker from its picture, and its height above other objects, metres.
 _BEFORE, _ABOVE = 0.03, 0.12
@@ -38,7 +38,7 @@ class Anchor:
     marker: Floats
     low: Floats
     high: Floats
-    picture: Picture | None = None
+    picture: PictureRectangle | None = None
 
 
 class Placing:
@@ -47,7 +47,7 @@ class Placing:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._faces = faces_of_objects(scene)
-        self.pictures = Pictures(scene)
+        self.pictures = PictureFinder(scene)
         #: Anchors by the name of the object: an editor places a tour again and again.
         self._known: dict[str, Anchor] = {}
 
@@ -61,17 +61,19 @@ class Placing:
     def _anchor(self, label: Label, number: int) -> Anchor:
         scene = self._scene
         if label.object:
-            own = self._faces.get(label.object, np.zeros(0, np.int64))
-            if not len(own):
-                raise unknown("object", label.object, scene.objects, f"labels[{number}].object")
+            faces = self._faces.get(label.object, np.zeros(0, np.int64))
+            if not len(faces):
+                raise unknown_name_error(
+                    "object", label.object, scene.objects, f"labels[{number}].object"
+                )
             if label.object not in self._known:
-                self._known[label.object] = self._of_faces(own)
+                self._known[label.object] = self._of_faces(faces)
             return self._known[label.object]
         if label.room:
             rooms = [room for room in scene.rooms if room.name == label.room and len(room.points)]
             if not rooms:
                 names = [room.name for room in scene.rooms]
-                raise unknown("room", label.room, names, f"labels[{number}].room")
+                raise unknown_name_error("room", label.room, names, f"labels[{number}].room")
             low, high = rooms[0].points.min(axis=0), rooms[0].points.max(axis=0)
             marker = (low + high) / 2
             marker[1] = min(low[1] + _ROOM_HEIGHT, high[1])
@@ -79,15 +81,15 @@ class Placing:
         at = np.array(label.at, dtype=np.float64)
         return Anchor(at, at, at)
 
-    def _of_faces(self, own: Ints) -> Anchor:
+    def _of_faces(self, faces: Ints) -> Anchor:
         """The anchor of an object with the faces (n,)."""
-        corners = self._scene.corners[own].reshape(-1, 3)
+        corners = self._scene.corners[faces].reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
-        picture = self.pictures.of(own)
+        picture = self.pictures.picture_of(faces)
         if picture is None:
             marker = np.array([(low[0] + high[0]) / 2, high[1] + _ABOVE, (low[2] + high[2]) / 2])
         else:
-            lower = picture.centre - picture.up * picture.height / 2
+            lower = picture.centre - picture.upward * picture.height / 2
             # A frame may stand out before the picture.
             out = float(((corners - picture.centre) @ picture.normal).max(initial=0))
             marker = lower + picture.normal * (max(out, 0) + _BEFORE)
@@ -98,13 +100,13 @@ def faces_of_objects(scene: Scene) -> dict[str, Ints]:
     """Name → the faces, ascending, of all objects of that name."""
     order = np.argsort(scene.triangle_object, kind="stable")
     starts = np.searchsorted(scene.triangle_object[order], np.arange(1, len(scene.objects)))
-    faces: dict[str, Ints] = {}
-    for name, own in zip(scene.objects, np.split(order, starts), strict=True):
-        faces[name] = np.sort(np.concatenate([faces[name], own])) if name in faces else own
-    return faces
+    named: dict[str, Ints] = {}
+    for name, faces in zip(scene.objects, np.split(order, starts), strict=True):
+        named[name] = np.sort(np.concatenate([named[name], faces])) if name in named else faces
+    return named
 
 
-def unknown(kind: str, name: str, names: Sequence[str], place: str) -> InputError:
+def unknown_name_error(kind: str, name: str, names: Sequence[str], place: str) -> InputError:
     """An error: no object, room or place of the model has this name."""
     near = get_close_matches(name, {n for n in names if n}, 1)
     remedy = (

@@ -69,7 +69,7 @@ def document_of(data: bytes) -> dict[str, Any]:
     try:
         schemas.check(document, schemas.TOUR)
     except schemas.ShapeError as fault:
-        raise _wrong(fault.place, fault.message) from None
+        raise _tour_error(fault.place, fault.message) from None
     try:
         json.dumps(document, ensure_ascii=False).encode()
     except UnicodeEncodeError:
@@ -80,20 +80,20 @@ def document_of(data: bytes) -> dict[str, Any]:
 def _tour(document: Mapping[str, Any], folder: Path) -> Tour:
     languages = tuple(document["languages"])
     if len({language.lower() for language in languages}) < len(languages):
-        raise _wrong("languages", "a language is listed twice")
-    reader = _Reader(languages, folder)
+        raise _tour_error("languages", "a language is listed twice")
+    reader = _TourReader(languages, folder)
     labels: dict[str, Label] = {}
     for number, row in enumerate(document["labels"]):
         place = f"labels[{number}]"
         if row["id"] in labels:
-            raise _wrong(f"{place}.id", f"{row['id']} is the id of an earlier label, too")
+            raise _tour_error(f"{place}.id", f"{row['id']} is the id of an earlier label, too")
         labels[row["id"]] = reader.label(row, place)
     order = {id: number for number, id in enumerate(labels)}
     stops = []
     for number, row in enumerate(document.get("stops", ())):
         place = f"stops[{number}]"
         if (id := row.get("label")) is not None and id not in order:
-            raise _wrong(f"{place}.label", f"no label has the id {id}")
+            raise _tour_error(f"{place}.label", f"no label has the id {id}")
         title = reader.texts(row, "title", place)
         stops.append(Stop(_view(row["view"], place), order.get(id, -1), title))
     places = {}
@@ -111,7 +111,7 @@ def _tour(document: Mapping[str, Any], folder: Path) -> Tour:
     )
 
 
-class _Reader:
+class _TourReader:
     """Reads the fields of labels and stops."""
 
     def __init__(self, languages: tuple[str, ...], folder: Path) -> None:
@@ -120,16 +120,18 @@ class _Reader:
     def label(self, row: Mapping[str, Any], place: str) -> Label:
         described = [name for name in ("object", "room", "at") if name in row]
         if len(described) != 1:
-            raise _wrong(place, "needs one of object, room and at")
+            raise _tour_error(place, "needs one of object, room and at")
         texts = {name: self.texts(row, name, place) for name in _TEXTS}
         sound = self._files(row, "sound", place, SOUNDS, LARGEST_SOUND)
         captions = self._files(row, "captions", place, CAPTIONS, LARGEST_CAPTIONS)
         if captions and not sound:
-            raise _wrong(f"{place}.captions", "captions need a sound")
+            raise _tour_error(f"{place}.captions", "captions need a sound")
         link = self.texts(row, "link", place)
         for tag, address in (link or {}).items():
             if not is_address(address):
-                raise _wrong(_of(f"{place}.link", tag), "is no address such as https://example.org")
+                raise _tour_error(
+                    _place_of(f"{place}.link", tag), "is no address such as https://example.org"
+                )
         at = tuple(row["at"]) if "at" in row else None
         return Label(
             row["id"], row.get("object", ""), row.get("room", ""), at, **texts,
@@ -143,27 +145,27 @@ class _Reader:
             return {"": value} if value else None
         for tag in value:
             if tag not in self._languages:
-                raise _wrong(
-                    _of(f"{place}.{name}".lstrip("."), tag),
+                raise _tour_error(
+                    _place_of(f"{place}.{name}".lstrip("."), tag),
                     f"{tag} is not among the languages of the tour",
                 )
         return {tag: text for tag, text in value.items() if text} or None
 
     def _files(
-        self, row: Mapping[str, Any], name: str, place: str, suffixes: Mapping[str, str], most: int
+        self, row: Mapping[str, Any], name: str, place: str, suffixes: Mapping[str, str], limit: int
     ) -> Mapping[str, Path] | None:
         texts = self.texts(row, name, place)
         files = {}
         for tag, text in (texts or {}).items():
-            where, file = _of(f"{place}.{name}", tag), self._folder / text
+            where, file = _place_of(f"{place}.{name}", tag), self._folder / text
             if file.suffix.lower() not in suffixes:
-                raise _wrong(where, f"{text} is not one of {', '.join(suffixes)}")
+                raise _tour_error(where, f"{text} is not one of {', '.join(suffixes)}")
             inside = Path(os.path.normpath(file)).is_relative_to(self._folder)
             if Path(text).is_absolute() or not inside:
-                raise _wrong(where, f"{text} lies outside the folder of the tour")
-            data = content_of(file, most)
+                raise _tour_error(where, f"{text} lies outside the folder of the tour")
+            data = content_of(file, limit)
             if suffixes is CAPTIONS and not _is_captions(data):
-                raise _wrong(where, f"{text} is not WebVTT")
+                raise _tour_error(where, f"{text} is not WebVTT")
             files[tag] = file
         return files or None
 
@@ -172,24 +174,24 @@ def _view(row: Mapping[str, Any], place: str) -> View:
     direction = row["direction"]
     length = math.hypot(*direction)
     if not 0 < length < math.inf:
-        raise _wrong(f"{place}.view.direction", "has no length")
+        raise _tour_error(f"{place}.view.direction", "has no length")
     x, y, z = (value / length for value in direction)
     return View(tuple(row["position"]), (x, y, z))
 
 
-def content_of(file: Path, most: int) -> bytes:
+def content_of(file: Path, limit: int) -> bytes:
     """The bytes of a file.
 
-    Raises InputError: PTM-I122 it cannot be read. LimitError: PTM-L204 it has more than ``most``.
+    Raises InputError: PTM-I122 it cannot be read. LimitError: PTM-L204 it has more than ``limit``.
     """
     try:
         with open_regular(file) as stream:
-            data = stream.read(most + 1)
+            data = stream.read(limit + 1)
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or fault
         raise InputError("PTM-I122", f"cannot be read ({reason})", file=file) from None
-    if len(data) > most:
-        raise LimitError("PTM-L204", f"more than {most >> 20} MiB", file=file)
+    if len(data) > limit:
+        raise LimitError("PTM-L204", f"more than {limit >> 20} MiB", file=file)
     return data
 
 
@@ -200,11 +202,11 @@ def _is_captions(data: bytes) -> bool:
         return False
 
 
-def _of(place: str, tag: str) -> str:
+def _place_of(place: str, tag: str) -> str:
     return f"{place}.{tag}" if tag else place
 
 
-def _wrong(place: str, message: str) -> InputError:
+def _tour_error(place: str, message: str) -> InputError:
     return InputError("PTM-I870", message, place=place, remedy="see docs/formats/tour.md")
 
 

@@ -19,9 +19,9 @@ from ptmtools.cells.model import Cells
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tour.model import FORMAT, SCHEMA
-from ptmtools.tour.pictures import Picture, Pictures, first_face
+from ptmtools.tour.pictures import PictureFinder, PictureRectangle, first_face
 from ptmtools.tour.placing import faces_of_objects
-from ptmtools.tour.writing import formatted
+from ptmtools.tour.writing import format_json
 
 #: Sides of a picture, metres.
 _LEAST, _GREATEST = 0.1, 5.0
@@ -63,10 +63,10 @@ def first_tour(
     ids: set[str] = set()
     labels, stops = [], []
     for proposal in (*rooms, *pictures):
-        own = _id(proposal.name, ids)
-        labels.append({"id": own, **proposal.label, "title": {"en": _title(proposal.name)}})
+        label_id = _id(proposal.name, ids)
+        labels.append({"id": label_id, **proposal.label, "title": {"en": _title(proposal.name)}})
         if proposal.view:
-            stops.append({"label": own, "view": proposal.view})
+            stops.append({"label": label_id, "view": proposal.view})
     document = {
         "format": FORMAT,
         "schema": SCHEMA,
@@ -76,18 +76,18 @@ def first_tour(
         "labels": labels,
         "stops": stops,
     }
-    return formatted(document) + "\n", len(pictures), len(rooms)
+    return format_json(document) + "\n", len(pictures), len(rooms)
 
 
 def _pictures(scene: Scene, cells: Cells) -> Iterator[Proposal]:
     """The pictures of a scene, in the order of its objects."""
-    shown, all_pictures = _objects_of_images(scene), Pictures(scene)
-    eyes = _Eyes(scene, cells, all_pictures)
+    shown, all_pictures = _objects_of_images(scene), PictureFinder(scene)
+    eyes = _EyeFinder(scene, cells, all_pictures)
     counts = Counter(scene.objects)
     for name, faces in faces_of_objects(scene).items():
         if not name or counts[name] > 1 or not _shows_an_image(scene, faces, shown):
             continue
-        picture = all_pictures.of(faces)
+        picture = all_pictures.picture_of(faces)
         if picture and eyes.hangs(picture):
             view = eyes.view_of(picture, faces)
             yield Proposal(name, {"object": name}, view and _row(*view))
@@ -133,24 +133,24 @@ def _shows_an_image(scene: Scene, faces: Ints, shown: Counter[int]) -> bool:
     return any(shown[image] <= _COPIES for image in _images_once(scene, faces))
 
 
-class _Eyes:
+class _EyeFinder:
     """Places to look at pictures from."""
 
-    def __init__(self, scene: Scene, cells: Cells, pictures: Pictures) -> None:
+    def __init__(self, scene: Scene, cells: Cells, pictures: PictureFinder) -> None:
         self._cells, self._pictures = cells, pictures
         low, high = scene.points.min(axis=0), scene.points.max(axis=0)
         self._middle = (low + high) / 2
         floor = cells.eye_floor
         self._floor = ray_tree((floor if len(floor) else scene.corners) - self._middle)
 
-    def hangs(self, picture: Picture) -> bool:
+    def hangs(self, picture: PictureRectangle) -> bool:
         """Whether a picture has a plausible size and is not a wall."""
         if not all(_LEAST <= side <= _GREATEST for side in (picture.width, picture.height)):
             return False
         before = picture.centre + _BEFORE * picture.normal
         return self._pictures.first(before, _DOWN)[1] > picture.height / 2 + _HANGS
 
-    def view_of(self, picture: Picture, own: Ints) -> tuple[Floats, Floats] | None:
+    def view_of(self, picture: PictureRectangle, faces: Ints) -> tuple[Floats, Floats] | None:
         """Eye and direction from which nothing hides the centre of a picture; None if no visitor
         can stand there."""
         tall = np.tan(_ANGLE / 2)
@@ -164,7 +164,7 @@ class _Eyes:
         eyes = [eye for eye in tried if eye is not None]
         lowest = min((eye[1] for eye in eyes), default=0.0)
         for eye in sorted(eyes, key=lambda eye: eye[1] > lowest + _STEP):
-            if self._sees(eye, picture, own):
+            if self._sees(eye, picture, faces):
                 return eye, picture.centre - eye
         return None
 
@@ -177,10 +177,10 @@ class _Eyes:
         inside = self._cells.locate(eye[None])[0] >= 0 and self._cells.eyes.contains(eye[None])[0]
         return eye if inside else None
 
-    def _sees(self, eye: Floats, picture: Picture, own: Ints) -> bool:
+    def _sees(self, eye: Floats, picture: PictureRectangle, faces: Ints) -> bool:
         """Whether the first surface towards the centre of a picture is its object."""
         hit, _ = self._pictures.first(eye, picture.centre - eye)
-        return hit >= 0 and bool((own == hit).any())
+        return hit >= 0 and bool((faces == hit).any())
 
 
 def _row(eye: Floats, direction: Floats) -> dict[str, Any]:
@@ -194,12 +194,12 @@ def _row(eye: Floats, direction: Floats) -> dict[str, Any]:
 def _id(name: str, taken: set[str]) -> str:
     """An id from a name, unlike the others."""
     stem = re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-_")[:56] or "label"
-    number, own = 1, stem
-    while own in taken:
+    number, unused = 1, stem
+    while unused in taken:
         number += 1
-        own = f"{stem}-{number}"
-    taken.add(own)
-    return own
+        unused = f"{stem}-{number}"
+    taken.add(unused)
+    return unused
 
 
 def _title(name: str) -> str:

@@ -22,18 +22,18 @@ _POINT = re.compile(r"\[\s+(-?[\d.e+-]+),\s+(-?[\d.e+-]+),\s+(-?[\d.e+-]+)\s+\]"
 _NAMES = ("id", "label")
 
 
-def formatted(value: Any, indent: int | str | None = 1) -> str:
+def format_json(value: Any, indent: int | str | None = 1) -> str:
     """JSON with a line for each member, and one for each point; all in one line without indent."""
     text = json.dumps(value, indent=indent, ensure_ascii=False)
     return _POINT.sub(r"[\1, \2, \3]", text)
 
 
-def rewritten(text: str, document: Any) -> str:
+def rewrite(text: str, document: Any) -> str:
     """The text of a document that was ``text`` before; JSON without a name twice in an object."""
-    root = _parsed(text, _SPACE.match(text).end())  # type: ignore[union-attr]
+    root = _parse(text, _SPACE.match(text).end())  # type: ignore[union-attr]
     lead = text[root.start + 1 : root.members[0].start] if root.members else ""
     unit = lead.rpartition("\n")[2] if "\n" in lead else None
-    return text[: root.start] + _Writer(text, unit).merged(root, document, "") + text[root.end :]
+    return text[: root.start] + _Writer(text, unit).merge(root, document, "") + text[root.end :]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class _Member:
     node: _Node
 
 
-def _parsed(text: str, start: int) -> _Node:
+def _parse(text: str, start: int) -> _Node:
     """The value that begins at a character of valid JSON."""
     kind = text[start]
     if kind not in "{[":
@@ -74,7 +74,7 @@ def _parsed(text: str, start: int) -> _Node:
         if kind == "{":
             name, at = _DECODER.raw_decode(text, at)
             at = _next(text, _next(text, at) + 1)
-        node = _parsed(text, at)
+        node = _parse(text, at)
         members.append(_Member(begin, name, node))
         at = _next(text, node.end)
         if text[at] == ",":
@@ -95,7 +95,7 @@ class _Writer:
     def __init__(self, text: str, unit: str | None) -> None:
         self._text, self._unit = text, unit
 
-    def merged(self, old: _Node | None, value: Any, indent: str, inline: bool = False) -> str:
+    def merge(self, old: _Node | None, value: Any, indent: str, inline: bool = False) -> str:
         """The text of a value in the place of an old one, in a line with an indentation."""
         if old is None:
             return self._new(value, indent, inline)
@@ -109,7 +109,7 @@ class _Writer:
         return self._new(value, indent, inline or not self._has_lines(old))
 
     def _new(self, value: Any, indent: str, inline: bool) -> str:
-        text = formatted(value, None if inline or self._unit is None else self._unit)
+        text = format_json(value, None if inline or self._unit is None else self._unit)
         return text.replace("\n", f"\n{indent}")
 
     def _object(self, old: _Node, value: Mapping[str, Any], indent: str) -> str:
@@ -119,15 +119,15 @@ class _Writer:
             number = before.get(name)
             gap, inside = self._gap(old, number, indent)
             if number is None:
-                text = f"{json.dumps(name, ensure_ascii=False)}: " + self.merged(
+                text = f"{json.dumps(name, ensure_ascii=False)}: " + self.merge(
                     None, inner, inside, inline=not self._has_lines(old)
                 )
             else:
                 member = old.members[number]
                 start = self._text[member.start : member.node.start]
-                text = start + self.merged(member.node, inner, inside)
+                text = start + self.merge(member.node, inner, inside)
             parts.append((gap, text))
-        return self._joined(old, parts)
+        return self._join(old, parts)
 
     def _list(self, old: _Node, values: Sequence[Any], indent: str) -> str:
         parts = []
@@ -135,8 +135,8 @@ class _Writer:
         for number, value in zip(_matches(old, values), values, strict=True):
             gap, inside = self._gap(old, number, indent)
             node = None if number is None else old.members[number].node
-            parts.append((gap, self.merged(node, value, inside, inline)))
-        return self._joined(old, parts)
+            parts.append((gap, self.merge(node, value, inside, inline)))
+        return self._join(old, parts)
 
     def _gap(self, old: _Node, number: int | None, indent: str) -> tuple[str, str]:
         """The text before a member, a new one without a number, and the indentation behind it."""
@@ -153,7 +153,7 @@ class _Writer:
     def _lead(self, old: _Node) -> str:
         return self._text[old.start + 1 : old.members[0].start]
 
-    def _joined(self, old: _Node, parts: Sequence[tuple[str, str]]) -> str:
+    def _join(self, old: _Node, parts: Sequence[tuple[str, str]]) -> str:
         """The members, each after its gap; the first one after the text that was before the
         first."""
         text = "".join(
@@ -178,8 +178,8 @@ def _matches(old: _Node, values: Sequence[Any]) -> Iterator[int | None]:
                 free[key(number, old.members[number].node.value)].append(number)
         free.pop(None, None)
         for number, value in enumerate(values):
-            if number not in chosen and (own := free.get(key(number, value))):
-                chosen[number] = own.pop()
+            if number not in chosen and (numbers := free.get(key(number, value))):
+                chosen[number] = numbers.pop()
 
     choose(lambda number, value: (number, _key(value)))
     choose(lambda number, value: _key(value))
@@ -200,12 +200,12 @@ def _name(value: Any) -> tuple[str, str] | None:
     return None
 
 
-def _same(one: Any, other: Any) -> bool:
+def _same(a: Any, b: Any) -> bool:
     """Whether two values of JSON are equal: 1 and 1.0 are, 1 and true are not."""
-    if isinstance(one, bool) or isinstance(other, bool):
-        return one is other
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_same, one, other))
-    return bool(one == other)
+    if isinstance(a, bool) or isinstance(b, bool):
+        return a is b
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_same(a[k], b[k]) for k in a)
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(_same, a, b))
+    return bool(a == b)

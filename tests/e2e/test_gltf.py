@@ -14,7 +14,7 @@ import pytest
 from benchmarks.npm import GLTF_VALIDATOR
 from ptmtools.cli.main import main
 from ptmtools.output.gltf import unpack
-from ptmtools.site.geometry import lean_glb
+from ptmtools.site.conversion import lean_glb
 from tests.output.agreement import disagreements
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from ptmtools.site.about import MANIFEST, About, described
+from ptmtools.site.about import MANIFEST, About, description_of
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.publishing import weight_of
 from tests.e2e.conftest import Ptm
@@ -51,7 +51,7 @@ def test_without_an_address_urls_are_relative() -> None:
 
 def test_places_describe_a_site() -> None:
     rows: list[dict[str, Any]] = [{"description": name} for name in ["Hall", "", "Attic", "Hall"]]
-    assert described(rows) == "Hall, Attic"
+    assert description_of(rows) == "Hall, Attic"
 
 
 def test_the_manifest_names_icons_of_their_sizes(site: Site) -> None:

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from ptmtools.site.catalogue import Content, catalogue_of
+from ptmtools.site.catalogue import CatalogueContent, catalogue_of
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.serving import serving
-from ptmtools.tour.captions import transcript_of
+from ptmtools.site.tours import transcript_of
 from ptmtools.tour.markdown import nodes_of
 
 HOSTILE = "</script><script>window.broken=1</script><img src=x onerror=window.broken=1>\"'"
@@ -24,11 +24,11 @@ def label(id: str, cell: int = 0, **fields: Any) -> dict[str, Any]:
     return {"id": id, "marker": [0, 0, 0], "box": [0] * 6, "cell": cell, **fields}
 
 
-def content(*labels: dict[str, Any], stops: list[dict[str, Any]] | None = None) -> Content:
+def content(*labels: dict[str, Any], stops: list[dict[str, Any]] | None = None) -> CatalogueContent:
     tour = {"languages": ["en", "ar"], "labels": list(labels), "stops": stops or []}
     pictures = {0: "data/work-a.jpg"}
     transcripts = {0: {"en": "Look left"}}
-    return Content(tour, "Museum", {0: "Hall", 1: "Attic"}, pictures, transcripts, "data/")
+    return CatalogueContent(tour, "Museum", {0: "Hall", 1: "Attic"}, pictures, transcripts, "data/")
 
 
 class Page(HTMLParser):

@@ -23,7 +23,7 @@ from ptmtools.rendering.painting import Painter
 from ptmtools.rendering.records import Sight
 from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.pictures import Kind, pictures_of
+from ptmtools.site.pictures import PictureKind, pictures_of
 from tests.output.agreement import kinds
 from tests.scene.conftest import GltfModel, png
 
@@ -182,7 +182,7 @@ def test_the_page_shows_them(visit: Callable[..., Any], colored: Site, database:
     assert apart.mean() < 1
     assert np.percentile(apart[:, -width // 8 :], 90) < 3
     # As a poster, or in the catalogue.
-    (poster,) = pictures_of(served, [(Kind(SHOWN, 1 << 20), place)])
+    (poster,) = pictures_of(served, [(PictureKind(SHOWN, 1 << 20), place)])
     with Image.open(io.BytesIO(poster)) as image:
         assert np.abs(shown - np.asarray(image)).mean() < 3
 

@@ -12,8 +12,8 @@ import pytest
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
+from ptmtools.site.about import element_tags
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.embedding import element_tags
 from ptmtools.site.entry import Entry
 from ptmtools.site.program import ELEMENT, element
 from ptmtools.site.serving import serving

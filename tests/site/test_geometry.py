@@ -11,7 +11,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.glb import COMPONENTS
 from ptmtools.output.gltf import pack, unpack
-from ptmtools.site.geometry import lean_glb
+from ptmtools.site.conversion import lean_glb
 from tests.e2e.conftest import make_museum
 
 UNREAD = ("name", "metallicFactor", "ptm", "baseColorTexture")

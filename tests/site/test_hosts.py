@@ -15,7 +15,7 @@ from samples import write_tour
 from benchmarks.web_rivals.nginx import free_port, program_of, running
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.entry import FRESH
-from ptmtools.site.lookup import below, files_of
+from ptmtools.site.lookup import files_of, folder_lookup
 from ptmtools.site.program import ELEMENT
 from ptmtools.site.published import PublishOptions
 from ptmtools.site.publishing import publish
@@ -102,7 +102,7 @@ def test_media_types_of_all_files_that_a_site_can_have(folder: Path) -> None:
     lines = re.findall(r"^ +(\w+/[\w+-]+) +([\w ]+);$", lines_of("guide/publish.md"), re.M)
     types = {f".{suffix}": media for media, suffixes in lines for suffix in suffixes.split()}
     assert types.items() >= {(suffix, media.partition(";")[0]) for suffix, media in wanted.items()}
-    find = below(folder)
+    find = folder_lookup(folder)
     for suffix, media in wanted.items():
         (folder / f"other{suffix}").write_bytes(b"x")
         entry = find(f"other{suffix}")

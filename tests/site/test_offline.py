@@ -20,7 +20,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse
 from ptmtools.cli.main import main
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.lookup import among
+from ptmtools.site.lookup import entry_lookup
 from ptmtools.site.program import INDEX, WORKER
 from ptmtools.site.publishing import weight_of
 from ptmtools.site.responses import app_of
@@ -84,7 +84,7 @@ class Host:
 
     def __init__(self, site: Site) -> None:
         self.visits, self.fault = Visits(), False
-        self._files = app_of(among(site.entries), visits=self.visits)
+        self._files = app_of(entry_lookup(site.entries), visits=self.visits)
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         path = scope["path"].removeprefix(f"/{FOLDER}")

@@ -22,8 +22,8 @@ from ptmtools.site.files import DATA
 from ptmtools.site.opening import (
     FEW,
     SMALL,
+    NeedFinder,
     Needs,
-    Views,
     ordered_steps,
     packed_opening,
     texture_steps,
@@ -139,7 +139,7 @@ def test_addresses(direction: tuple[float, ...], expected: float) -> None:
 
 def test_needs_are_those_of_the_pixels(served: Served) -> None:
     viewpoint = served.index["viewpoints"][0]
-    needs = Views(served).needs(viewpoint)
+    needs = NeedFinder(served).needs(viewpoint)
     assert 0 < sum(needs.cells.values()) <= 1 + 1e-9
     assert viewpoint["cell"] in needs.cells
     total = sum(share[0] for share in needs.textures.values())
@@ -259,7 +259,7 @@ def test_it_sees_as_the_client(two_rooms: Path) -> None:
         eye, direction = (np.array([viewpoint[name]]) for name in ("position", "direction"))
         camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
         (views,) = look(served.surfaces, read_pyramids(served), camera, eye, direction)
-        needs = Views(served).needs(viewpoint)
+        needs = NeedFinder(served).needs(viewpoint)
         for texture, share in needs.textures.items():
             expected = views.need[views.texture == texture].sum(axis=0)[: len(share)]
             assert share == pytest.approx(expected, abs=2e-4)

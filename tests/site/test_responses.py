@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.site.entry import Entry
-from ptmtools.site.lookup import Lookup, among, below
+from ptmtools.site.lookup import Lookup, entry_lookup, folder_lookup
 from ptmtools.site.responses import app_of
 from ptmtools.site.serving import running, serving
 from ptmtools.site.throttle import Paced, Throttle, Visits
@@ -49,7 +49,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Lookup:
         Entry("data/small.json", b"{}", "application/json", compressed=True),
         Entry("data/empty.ptm", b"", "application/octet-stream"),
     ]
-    own, others = among({entry.name: entry for entry in entries}), below(www)
+    own, others = entry_lookup({entry.name: entry for entry in entries}), folder_lookup(www)
     return lambda name: own(name) or others(name)
 
 
@@ -264,7 +264,7 @@ def test_an_empty_file(ask: Client) -> None:
 def test_a_file_that_changes_gets_another_tag(tmp_path: Path) -> None:
     file = tmp_path / "a.json"
     file.write_bytes(TEXTS)
-    with serving(below(tmp_path)) as url, client_of(url) as ask:
+    with serving(folder_lookup(tmp_path)) as url, client_of(url) as ask:
         first = ask("/a.json", Accept_Encoding="gzip")
         file.write_bytes(TEXTS[::-1])
         os.utime(file, ns=(1, 1))
@@ -294,7 +294,7 @@ def test_names_with_a_hash_may_be_kept_of_a_published_folder(tmp_path: Path) -> 
     for name in (*names, *others):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(b"x")
-    with serving(below(tmp_path, hashed=True)) as url, client_of(url) as ask:
+    with serving(folder_lookup(tmp_path, hashed=True)) as url, client_of(url) as ask:
         sent = {name: ask(f"/{name}").headers["cache-control"] for name in (*names, *others)}
     assert {name for name, caching in sent.items() if "immutable" in caching} == {*names}
 
@@ -367,7 +367,7 @@ def test_header_bytes_are_those_on_the_link(served: str, visits: Visits) -> None
 def test_who_goes_away_is_recorded_and_leaves_the_link() -> None:
     visits = Visits()
     files = {"a": Entry("a", NOISE, "x/y")}
-    app = app_of(among(files), throttle=Throttle(1e6), visits=visits)
+    app = app_of(entry_lookup(files), throttle=Throttle(1e6), visits=visits)
     assert isinstance(app, Paced)
     with running(app) as url:
         where = urlsplit(url)
@@ -379,7 +379,7 @@ def test_who_goes_away_is_recorded_and_leaves_the_link() -> None:
         while visit.ended is None:
             assert time.monotonic() < end, "waited in vain"
             time.sleep(0.005)
-    assert app.link.shared_by == 0
+    assert app.link.flow_count == 0
     assert not visit.whole
     assert visit.bytes < len(NOISE)
 

@@ -24,7 +24,7 @@ from ptmtools.site import lookup
 from ptmtools.site.content import SiteOptions
 from ptmtools.site.entry import Entry
 from ptmtools.site.lookup import Lookup
-from ptmtools.site.responses import opened
+from ptmtools.site.responses import open_entry
 from ptmtools.site.serving import url_of
 from ptmtools.store.manifest import SCHEMA, Manifest, StageRecord
 from tests.site.client import NOISE, PAGE, client_of
@@ -249,7 +249,7 @@ def test_a_database_that_is_built_again(tmp_path: Path) -> None:
         entry = find(name)
         assert entry
         with pytest.raises((BlockingIOError, FileNotFoundError)):
-            opened(entry)
+            open_entry(entry)
     after = data_of(find)
     assert textures_in(after).isdisjoint(textures_in(before))
     shutil.rmtree(made)

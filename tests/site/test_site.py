@@ -22,12 +22,11 @@ from ptmtools.output.emission import compressed
 from ptmtools.site import pictures as drawing
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of, title_of
+from ptmtools.site.conversion import lean_glb, web_texture
 from ptmtools.site.entry import is_marked, link_bytes
 from ptmtools.site.files import DATA
-from ptmtools.site.geometry import lean_glb
 from ptmtools.site.program import ELEMENT, LATER, PROGRAM
 from ptmtools.site.publishing import weight_of
-from ptmtools.site.textures import web_texture
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
 
 PLAIN = SiteOptions(pictures=False)

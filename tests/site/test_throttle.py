@@ -15,7 +15,7 @@ import pytest
 from ptmtools.errors import InputError
 from ptmtools.link import Conditions
 from ptmtools.site import throttle
-from ptmtools.site.throttle import LATE, PIECE, Link, Paced, Throttle, Visits
+from ptmtools.site.throttle import LATE, PIECE, Paced, SharedLink, Throttle, Visits
 from ptmtools_lab.network import Link as FluidLink
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ LATENESS = 0.004
 
 
 def passed(
-    link: Link, requests: Sequence[tuple[float, int]], lateness: float = LATENESS
+    link: SharedLink, requests: Sequence[tuple[float, int]], lateness: float = LATENESS
 ) -> list[list[tuple[float, int]]]:
     """Of each request, (when it is made, how many bytes) → when pieces were sent, and how large."""
     random = Random(1)
@@ -61,7 +61,7 @@ def by(pieces: list[tuple[float, int]], moment: float) -> int:
 def test_bandwidth_is_kept_and_shared_equally(bandwidth: float, flows: int) -> None:
     seconds = 3.0
     each = math.ceil(bandwidth / 8 * seconds)
-    sent = passed(Link(Throttle(bandwidth, 0.1)), [(0.0, each)] * flows)
+    sent = passed(SharedLink(Throttle(bandwidth, 0.1)), [(0.0, each)] * flows)
     amounts = [by(pieces, 0.1 + seconds) for pieces in sent]
     assert sum(amounts) == pytest.approx(bandwidth / 8 * seconds, rel=0.02)
     assert min(amounts) == pytest.approx(max(amounts), rel=0.03)
@@ -70,7 +70,7 @@ def test_bandwidth_is_kept_and_shared_equally(bandwidth: float, flows: int) -> N
 
 @pytest.mark.parametrize("bandwidth", BANDWIDTHS)
 def test_each_of_six_gets_a_steady_stream(bandwidth: float) -> None:
-    sent = passed(Link(Throttle(bandwidth)), [(0.0, round(bandwidth / 8))] * 6)
+    sent = passed(SharedLink(Throttle(bandwidth)), [(0.0, round(bandwidth / 8))] * 6)
     for pieces in sent:
         times = [when for when, _ in pieces]
         gaps = [b - a for a, b in pairwise(times)]
@@ -96,7 +96,7 @@ def test_responses_end_when_they_do_in_the_simulator(bandwidth: float, seed: int
         fluid.request(size, 0.0, number)
     while finished := fluid.advance(1e6):
         expected[finished.tag] = fluid.now
-    sent = passed(Link(Throttle(bandwidth, 0.08)), requests)
+    sent = passed(SharedLink(Throttle(bandwidth, 0.08)), requests)
     for number, pieces in enumerate(sent):
         begun = requests[number][0]
         allowed = 3 * PIECE + LATENESS + 0.02 * (expected[number] - begun)
@@ -106,7 +106,7 @@ def test_responses_end_when_they_do_in_the_simulator(bandwidth: float, seed: int
 def test_late_timers_lose_nothing_but_long_absence_does() -> None:
     rate = 1e6 / 8
     for absence, lost in ((LATE / 2, 0.0), (1.0, 1.0 - LATE)):
-        link = Link(Throttle(1e6))
+        link = SharedLink(Throttle(1e6))
         flow = link.open(0.0)
         piece, through = link.book(flow, 10**6, 0.0)
         second, again = link.book(flow, 10**6, through + absence)
@@ -150,7 +150,7 @@ def test_the_server_may_be_late_and_a_client_may_not(
 
 
 def test_who_gives_up_leaves_the_link_to_the_others() -> None:
-    link = Link(Throttle(800_000))  # 1000 bytes in a hundredth of a second
+    link = SharedLink(Throttle(800_000))  # 1000 bytes in a hundredth of a second
     stays, leaves = link.open(0.0), link.open(0.0)
     _, through = link.book(stays, 10**6, 0.0)
     assert link.book(leaves, 10**6, 0.0)[0] == 500
@@ -160,14 +160,14 @@ def test_who_gives_up_leaves_the_link_to_the_others() -> None:
 
 
 def test_without_limit_only_the_latency_counts() -> None:
-    link = Link(Throttle(latency=0.2))
+    link = SharedLink(Throttle(latency=0.2))
     flow = link.open(1.0)
     assert flow.ready == pytest.approx(1.2)
     assert link.book(flow, 10**9, 1.3) == (10**9, 1.3)
 
 
 def test_there_is_always_a_byte() -> None:
-    link = Link(Throttle(1))
+    link = SharedLink(Throttle(1))
     flow = link.open(0.0)
     assert link.book(flow, 5, 0.0) == (1, 8.0)
     with pytest.raises(ValueError, match="nothing"):

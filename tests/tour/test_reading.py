@@ -58,7 +58,7 @@ def test_a_complete_tour(folder: Path) -> None:
     assert (tour.languages, tour.title, tour.model) == (("en", "de"), {"": "T"}, "m.obj")
     assert tour.description == {"de": "Alt"}
     assert tour.places == {"Room 1": {"en": "Hall"}, "Room 2": {"": "Room 2"}}
-    assert tour.renamed == {"Room 1": {"en": "Hall"}}, "the other keeps the name of the model"
+    assert tour.new_names == {"Room 1": {"en": "Hall"}}, "the other keeps the name of the model"
     (own,) = tour.labels
     assert own.title == {"en": "Night", "de": "Nacht"}
     assert own.text == {"en": "*Text*"}, "an empty text is none"

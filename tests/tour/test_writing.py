@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.tour.writing import formatted, rewritten
+from ptmtools.tour.writing import format_json, rewrite
 
 #: As a person writes it: several members in a line, points in one, and an escape.
 TEXT = """{
@@ -32,7 +32,7 @@ TEXT = """{
 
 def changed(document: Any, text: str = TEXT) -> tuple[list[str], list[str]]:
     """The lines that a change removes, and those that it adds."""
-    after = rewritten(text, document)
+    after = rewrite(text, document)
     assert json.loads(after) == document
     old, new = text.splitlines(), after.splitlines()
     steps = difflib.SequenceMatcher(None, old, new, autojunk=False).get_opcodes()
@@ -49,7 +49,7 @@ def tour() -> Any:
 
 
 def test_nothing_changes_without_a_change(tour: Any) -> None:
-    assert rewritten(TEXT, tour) == TEXT
+    assert rewrite(TEXT, tour) == TEXT
 
 
 def test_a_change_of_a_text_is_a_change_of_its_line(tour: Any) -> None:
@@ -62,7 +62,7 @@ def test_a_change_of_a_text_is_a_change_of_its_line(tour: Any) -> None:
 def test_a_moved_stop_keeps_its_text(tour: Any) -> None:
     first, second = TEXT.splitlines()[10:12]
     tour["stops"].reverse()
-    assert f"{second},\n{first[:-1]}\n" in rewritten(TEXT, tour)
+    assert f"{second},\n{first[:-1]}\n" in rewrite(TEXT, tour)
     assert max(map(len, changed(tour))) <= 2
 
 
@@ -78,14 +78,14 @@ def test_new_members_look_like_their_neighbours(tour: Any) -> None:
 
 
 def test_a_new_label_in_a_tour_of_init(tour: Any) -> None:
-    text = formatted(tour) + "\n"
+    text = format_json(tour) + "\n"
     more = deepcopy(tour)
     more["labels"].insert(1, {"id": "new", "at": [1, 2, 3], "title": {"en": "New"}})
     before, after = changed(more, text)
     assert before == []
     assert len(after) == 7
     assert '   "at": [1, 2, 3],' in after
-    assert rewritten(rewritten(text, more), tour) == text
+    assert rewrite(rewrite(text, more), tour) == text
 
 
 VALUES = st.recursive(
@@ -101,7 +101,7 @@ VALUES = st.recursive(
 @given(VALUES, VALUES, st.sampled_from([None, 1, "\t"]))
 def test_any_value_takes_the_place_of_any_other(one: Any, other: Any, indent: Any) -> None:
     text = " " + json.dumps(one, indent=indent) + "\n"
-    assert rewritten(text, one) == text
-    after = rewritten(text, other)
+    assert rewrite(text, one) == text
+    after = rewrite(text, other)
     assert json.loads(after) == other
-    assert rewritten(after, other) == after
+    assert rewrite(after, other) == after
