@@ -58,10 +58,10 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_430, 24),
     "ptmtools/store": (2_300, 13),
-    "ptmtools/texture": (10_420, 45),
+    "ptmtools/texture": (10_080, 44),
     "ptmtools/tour": (1_250, 8),
     "ptmtools/visibility": (960, 6),
-    "ptmtools_lab": (10_900, 59),
+    "ptmtools_lab": (11_250, 61),
     "ptmtools_samples": (8_400, 56),
     "ptmtools_systems": (7_670, 52),
 }

@@ -22,3 +22,6 @@ TRADEOFF = Entry(
     "Measure the cost and the benefit of each option.",
     "ptmtools_lab.cli.tradeoff:tradeoff",
 )
+COMPARE = Entry(
+    "Images", "Compare .ptm with other image formats.", "ptmtools_lab.cli.codecs:compare"
+)

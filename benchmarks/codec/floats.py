@@ -31,7 +31,7 @@ from images import OUTPUT
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, encode, load_image
-from ptmtools.texture.comparison import time_best
+from ptmtools_lab.codecs import time_best
 
 Samples = NDArray[Any]
 SIDE = 768

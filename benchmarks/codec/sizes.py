@@ -27,7 +27,7 @@ from images import image_files, sample, sets
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, decode, encode, read_image
-from ptmtools.texture.comparison import Codec, CodecFigures, codecs, measure, total
+from ptmtools_lab.codecs import Codec, CodecFigures, codecs, measure, total
 
 #: Largest total of `fast` over PNG, and of `small` over JPEG XL effort 7, by set.
 FAST_GOALS = {"Kodak": 0.76, "textures": 0.88, "scenes": 0.90}

@@ -1,13 +1,13 @@
-"""Commands for images and `.ptm`s: `ptm encode`, `decode` and `compare`."""
+"""Commands for images and `.ptm`s: `ptm encode` and `decode`."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -18,34 +18,24 @@ from ptmtools.cli.batch import (
     Report,
     Shard,
     ShardOf,
-    expanded,
     jobs_for,
     many_files,
-    no_name,
     standard_input,
 )
-from ptmtools.cli.console import Console
 from ptmtools.cli.encoding import FileCoding, FilePreviews, encoded_by_cluster, encoded_file
 from ptmtools.cli.parameters import (
     Command,
-    Named,
     Numbers,
-    json_option,
-    limit_option,
     option,
     options_of,
     output_option,
     scheduler_address,
     take,
-    with_console,
 )
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.quantities import count, size
-from ptmtools.texture.model import Description, EncodeOptions, Limits
+from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.profiles import PROFILES
-
-if TYPE_CHECKING:
-    from ptmtools.texture.comparison import CodecFigures
 
 
 @click.command("encode", cls=Command)
@@ -284,94 +274,3 @@ def _refuse_image_suffix(output: str) -> None:
             file=output,
             remedy="name the output .ptm",
         )
-
-
-def _profiles(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, ...]:
-    """Names of profiles, separated by commas."""
-    one = Named(PROFILES)
-    return tuple(one.convert(name, parameter, context) for name in value.split(","))
-
-
-@click.command("compare", cls=Command)
-@click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=click.Path())
-@option(
-    "--profiles",
-    callback=_profiles,
-    default=lambda: ",".join(PROFILES),
-    metavar="NAME[,NAME]",
-    help="Profiles of .ptm to compare; all by default.",
-)
-@option(
-    "--repeat",
-    type=click.IntRange(1, 100),
-    default=2,
-    help="Runs of each measurement; the shortest time counts.",
-)
-@limit_option
-@json_option
-@with_console
-def compare(
-    console: Console,
-    images: tuple[str, ...],
-    profiles: tuple[str, ...],
-    repeat: int,
-    limits: Limits,
-) -> None:
-    """Compare the size and speed of .ptm with other lossless image formats.
-
-    IMAGE is a file, a pattern such as 'scans/*.tif' or a folder (all images in it). A .ptm file
-    holds all levels; other formats are measured with one file of the finest level, and with one
-    file for each level. Speeds are in MB/s of uncompressed texels of the finest level, on one
-    thread.
-    """
-    from ptmtools.texture.comparison import codecs, measure, total
-    from ptmtools.texture.images import SUFFIXES, load_image
-
-    contenders = codecs(profiles)
-    sources = expanded(images, SUFFIXES)
-    measured = []
-    for source in sources:
-        if not source:
-            raise no_name()
-        with naming(source):
-            texels = load_image(source, limits).array()
-            measured.append(measure(texels, contenders, repeat))
-        if not console.as_json:
-            height, width, components = texels.shape
-            what = f"{width} x {height}, {count(components, 'component')} of {texels.dtype}"
-            for line in _table(f"{source}: {what}, {size(texels.nbytes)}", measured[-1]):
-                console.print(line)
-    sums = total(measured)
-    each = [[asdict(one) for one in rows] for rows in measured]
-    tables = [{"image": name, "codecs": codecs} for name, codecs in zip(sources, each, strict=True)]
-    lines = ["", *_table(f"total of {len(sources)} images", sums)] if len(sources) > 1 else []
-    console.result({"images": tables, "total": [asdict(one) for one in sums]}, lines)
-
-
-def _table(title: str, rows: list[CodecFigures]) -> Iterator[str]:
-    """The lines of a table of sizes, also as multiples of the finest level as PNG, and speeds."""
-    png = next((one.finest_bytes for one in rows if one.codec == "PNG"), None)
-    yield title
-    yield (
-        f"{'':<26}{'finest level':>14}{'ratio to PNG':>14}"
-        f"{'all levels':>14}{'ratio to PNG':>14}{'encode':>12}{'decode':>12}"
-    )
-    for one in rows:
-        if one.problem:
-            yield f"{one.codec:<26}{one.problem}"
-            continue
-        finest = "–" if one.finest_bytes is None else f"{one.finest_bytes:,}"
-        yield (
-            f"{one.codec:<26}{finest:>14}{_ratio(one.finest_bytes, png):>14}"
-            f"{one.all_bytes:>14,}{_ratio(one.all_bytes, png):>14}"
-            f"{_speed(one.raw_bytes, one.encode_seconds):>12}"
-            f"{_speed(one.raw_bytes, one.decode_seconds):>12}"
-        )
-
-
-def _ratio(part: int | None, whole: int | None) -> str:
-    return f"{part / whole:.3f}" if part and whole else "–"
-
-
-def _speed(done: int, seconds: float) -> str:
-    return f"{done / 1e6 / max(seconds, 1e-9):.1f} MB/s"

@@ -61,7 +61,6 @@ OWN = {
     "tour": Entry("Publish", "Label the works of a building.", f"{_CLI}.tour:commands"),
     "encode": Entry("Images", "Encode images as .ptm files.", f"{_CLI}.images:encode"),
     "decode": Entry("Images", "Decode .ptm files to images.", f"{_CLI}.images:decode"),
-    "compare": Entry("Images", "Compare .ptm with other image formats.", f"{_CLI}.images:compare"),
 }
 
 

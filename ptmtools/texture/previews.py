@@ -243,15 +243,8 @@ class Pyramid:
             square += float(squares.sum())
         texel_count = height * width
         error = math.sqrt(self.squares[level] + square / texel_count)
-        return Preview(
-            level,
-            width,
-            height,
-            len(data),
-            name,
-            round_difference(length / texel_count),
-            round_difference(error),
-        )
+        difference = round_difference(length / texel_count)
+        return Preview(level, width, height, len(data), name, difference, round_difference(error))
 
     def source(self, data: bytes, name: str) -> Preview:
         """The preview that is the source of the texture."""

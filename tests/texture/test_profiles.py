@@ -59,7 +59,9 @@ Install = Callable[..., None]
 
 @pytest.fixture
 def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Replaces the installed plug-ins by profiles, each under its own name or another."""
+    """Replaces the installed profiles by others, each under its own name or another."""
+
+    real = plugins.entry_points
 
     def forget() -> None:
         plugins.points.cache_clear()
@@ -72,7 +74,9 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
         for name, profile in profiles.items():
             monkeypatch.setattr(PLUGINS, name, profile, raising=False)
         monkeypatch.setattr(
-            plugins, "entry_points", lambda group: EntryPoints(names).select(group=group)
+            plugins,
+            "entry_points",
+            lambda group: EntryPoints(names) if group == "ptmtools.profiles" else real(group=group),
         )
         forget()
 

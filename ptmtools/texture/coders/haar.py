@@ -146,15 +146,8 @@ def _pass(
     components = level.shape[2]
     others = reference_counts(components)
     return kernels.haar_pass(
-        level,
-        below,
-        plane_order(components),
-        others,
-        BUILT_IN_WEIGHTS[others] if sent is None else sent,
-        ACTIVITY_WEIGHTS[others],
-        class_of_activity(),
-        ranks.ranks,
-        sink,
-        source,
+        level, below, plane_order(components), others,
+        BUILT_IN_WEIGHTS[others] if sent is None else sent, ACTIVITY_WEIGHTS[others],
+        class_of_activity(), ranks.ranks, sink, source,
         kernels.workspace(below.shape[1], components),
-    )
+    )  # fmt: skip

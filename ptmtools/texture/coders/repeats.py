@@ -85,22 +85,12 @@ def _pass(
     height, width, components = shape
     bits = min(max(below.size.bit_length(), 6), MOST_BITS)
     return kernels.repeats_pass(
-        level.reshape(-1),
-        height,
-        width,
-        below,
-        plane_order(components),
-        WEIGHTS,
+        level.reshape(-1), height, width, below, plane_order(components), WEIGHTS,
         np.searchsorted(CLASS_BOUNDS, np.arange(1024), side="right").astype(np.uint8),
-        np.zeros((5, 1 << bits), np.uint32),
-        np.zeros(1 << bits, np.uint32),
-        np.zeros(below.shape[1] + 1, np.int64),
-        np.zeros(3, np.int64),
-        np.uint64(32 - bits),
-        sink,
-        source,
-        state,
-    )
+        np.zeros((5, 1 << bits), np.uint32), np.zeros(1 << bits, np.uint32),
+        np.zeros(below.shape[1] + 1, np.int64), np.zeros(3, np.int64), np.uint64(32 - bits),
+        sink, source, state,
+    )  # fmt: skip
 
 
 def _pack(level: Bytes) -> NDArray[np.uint32]:

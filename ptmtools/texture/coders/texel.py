@@ -125,32 +125,20 @@ class _Group:
         take."""
         components = numbers.shape[2]
         others = reference_counts(components)
-        exact = {"float16": kernels.HALF, "float32": kernels.SINGLE}.get(
-            self.kind.name, kernels.WHOLE
-        )
+        exact = {"float16": kernels.HALF, "float32": kernels.SINGLE}
+        rule = kernels.FREE if self.max_error else exact.get(self.kind.name, kernels.WHOLE)
         none = np.zeros(0, np.uint16)
-        return int(
-            kernels.texel_pass(
-                sink is not None,
-                numbers,
-                self.means,
-                self.work.copy().reshape(-1),
-                self.work.shape[2],
-                self.max_error,
-                kernels.FREE if self.max_error else exact,
-                plane_order(components),
-                others,
-                (layout.BUILT_IN_WEIGHTS[others] if weights is None else weights).reshape(-1),
-                layout.offsets(self.work.shape[2]).reshape(-1),
-                self.numbering.arrays,
-                window,
-                sink or empty_sink(0, 0),
-                source or kernels.TexelSource(none, none, np.zeros(0, np.uint32)),
-                plain,
-                limits,
-                kernels.workspace(numbers.shape[1], components),
-            )
-        )
+        stride = self.work.shape[2]
+        result = kernels.texel_pass(
+            sink is not None, numbers, self.means, self.work.copy().reshape(-1), stride,
+            self.max_error, rule, plane_order(components), others,
+            (layout.BUILT_IN_WEIGHTS[others] if weights is None else weights).reshape(-1),
+            layout.offsets(stride).reshape(-1), self.numbering.arrays, window,
+            sink or empty_sink(0, 0),
+            source or kernels.TexelSource(none, none, np.zeros(0, np.uint32)), plain, limits,
+            kernels.workspace(numbers.shape[1], components),
+        )  # fmt: skip
+        return int(result)
 
 
 def _coded_forms(level: Samples, below: Samples, max_error: int) -> list[Coded]:

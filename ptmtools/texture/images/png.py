@@ -113,25 +113,19 @@ def _filter_rows(image: NDArray[np.uint16]) -> Iterator[bytes]:
         rows = image[first : y + step].astype(">u2").view(np.uint8).reshape(-1, width * texel)
         padded = np.zeros((len(rows) + (y == 0), (width + 1) * texel), np.uint8)
         padded[y == 0 :, texel:] = rows
-        current, west = padded[1:, texel:], padded[1:, :-texel]
+        row, west = padded[1:, texel:], padded[1:, :-texel]
         north, corner = padded[:-1, texel:], padded[:-1, :-texel]
         mean = (west.astype(np.uint16) + north) >> 1
         filtered = np.stack(
-            [
-                current,
-                current - west,
-                current - north,
-                current - mean,
-                current - _paeth(west, north, corner),
-            ],
+            [row, row - west, row - north, row - mean, row - _paeth(west, north, corner)],
             dtype=np.uint8,
             casting="unsafe",
         )
         cost = np.abs(filtered.view(np.int8).astype(np.int16)).sum(axis=2)
         best = cost.argmin(axis=0)
-        out = np.empty((len(current), 1 + width * texel), np.uint8)
+        out = np.empty((len(row), 1 + width * texel), np.uint8)
         out[:, 0] = best
-        out[:, 1:] = filtered[best, np.arange(len(current))]
+        out[:, 1:] = filtered[best, np.arange(len(row))]
         yield out.tobytes()
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ptmtools.texture import build_pyramid, encode
-from ptmtools.texture.comparison import Codec, codecs, measure, total
 from ptmtools.texture.images.png import png_bytes
 from ptmtools.texture.model import EncodeOptions
+from ptmtools_lab.codecs import Codec, codecs, measure, total
 
 RNG = np.random.default_rng(4)
 
