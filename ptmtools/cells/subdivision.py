@@ -236,11 +236,6 @@ def assemble_cells(
     standing, eye_floor, standing_notes = _viewers(scene, building, space, bodies, rename)
     # The inside of a door leaf is no place.
     standing &= ~_in_door_leaves(bodies, rename[ends[passage]], building.structure.tolerance)
-    children = tree.children.copy()
-    is_leaf = children <= -2
-    leaf = rename[-2 - children[is_leaf]]
-    children[is_leaf] = np.where(leaf >= 0, -2 - leaf, OUTSIDE)
-
     owned = np.any(owner >= 0, axis=1)
     corners = scene.corners[pieces.source]
     corners[pieces.cut] = pieces.corner[..., :3]
@@ -250,7 +245,7 @@ def assemble_cells(
     loops = [loop + point_start[i] for i, b in enumerate(bodies) for loop in b.faces]
     return Cells(
         node_plane=tree.planes,
-        node_child=children,
+        node_child=_rename_children(tree.children, rename),
         root_box=space.box,
         leaf_cell=np.arange(len(bodies), dtype=np.int32),
         leaf_standing=standing,
@@ -278,6 +273,12 @@ def assemble_cells(
         closed=space.closed,
         notes=(*notes, *standing_notes),
     )
+
+
+def _rename_children(children: NDArray[np.int32], rename: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(N, 2) `Cells.node_child` of a tree whose leaves have new numbers, -1 for none."""
+    leaf = rename[-2 - np.minimum(children, -2)]
+    return np.where(children > -2, children, np.where(leaf >= 0, -2 - leaf, OUTSIDE))
 
 
 def _viewers(
