@@ -140,11 +140,9 @@ def read_header(data: bytes) -> PtmHeader:
     sizes = _sizes(width, height, components, count, trimmed)
     if zero:
         raise _head_error("a reserved byte is not 0")
-    tile = max_error = described = crc32 = 0
-    if version > 1:
-        tile, max_error, described, crc32 = _MORE.unpack_from(data, _FIXED.size)
-    low, high = TILE_SIDES
-    if tile and not (low <= tile <= high and tile % 2 == 0):
+    more = data[_FIXED.size : size] if version > 1 else bytes(_MORE.size)
+    tile, max_error, described, crc32 = _MORE.unpack_from(more)
+    if tile and (tile % 2 or not TILE_SIDES[0] <= tile <= TILE_SIDES[1]):
         raise _head_error(f"tiles of {tile} texels are impossible")
     if max_error > (samples.top_error if profile.lossy else 0) or described > DESCRIPTION_MAX:
         raise _head_error("its largest error or the length of its description is impossible")
