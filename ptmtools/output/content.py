@@ -53,7 +53,7 @@ class EmitExtras:
 
 
 #: The place of a texture in the hints, and its record.
-Place = tuple[int, TextureRecord]
+PlacedTexture = tuple[int, TextureRecord]
 
 
 class TexturePlaces:
@@ -68,9 +68,13 @@ class TexturePlaces:
 
     def __init__(self, textures: Sequence[TextureRecord]) -> None:
         placed = list(enumerate(textures))
-        self.of_image: dict[int, Place] = {r.image: (i, r) for i, r in placed if r.image >= 0}
-        self.of_cell: dict[int, Place] = {r.cell: (i, r) for i, r in placed if r.cell >= 0}
-        self.of_object: dict[int, Place] = {r.object: (i, r) for i, r in placed if r.object >= 0}
+        self.of_image: dict[int, PlacedTexture] = {
+            r.image: (i, r) for i, r in placed if r.image >= 0
+        }
+        self.of_cell: dict[int, PlacedTexture] = {r.cell: (i, r) for i, r in placed if r.cell >= 0}
+        self.of_object: dict[int, PlacedTexture] = {
+            r.object: (i, r) for i, r in placed if r.object >= 0
+        }
 
 
 @dataclass(frozen=True)

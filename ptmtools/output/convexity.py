@@ -97,9 +97,12 @@ def leaf_numbers(cells: Cells, slack: float) -> list[list[list[float]]]:
     for leaf, (a, b) in enumerate(pairwise(start.tolist())):
         numbers.append(points[a:b])
         if reach[leaf] > slack:
-            own = slice(*cells.leaf_face_start[leaf : leaf + 2].tolist())
-            corner = decimals[cells.face_index[faces[:-1][own]]]
-            height = unit[own] @ decimals[a:b].T - np.einsum("ij,ij->i", unit[own], corner)[:, None]
+            face_range = slice(*cells.leaf_face_start[leaf : leaf + 2].tolist())
+            corner = decimals[cells.face_index[faces[:-1][face_range]]]
+            height = (
+                unit[face_range] @ decimals[a:b].T
+                - np.einsum("ij,ij->i", unit[face_range], corner)[:, None]
+            )
             if height.max() > slack:
                 numbers[-1] = cells.leaf_point[a:b].tolist()
     return numbers
@@ -110,8 +113,10 @@ def _face_units(cells: Cells, point: Floats) -> Floats:
     the plane of which is arbitrary."""
     following = np.arange(1, len(cells.face_index) + 1)
     following[cells.face_start[1:] - 1] = cells.face_start[:-1]
-    here, start = point[cells.face_index], cells.face_start[:-1]
-    planes, sound = polygon_planes(here, here[following], start, cells.tolerance.plane)
+    corner_point, start = point[cells.face_index], cells.face_start[:-1]
+    planes, sound = polygon_planes(
+        corner_point, corner_point[following], start, cells.tolerance.plane
+    )
     unit: Floats = planes[:, :3] * sound[:, None]
     return unit
 
@@ -302,9 +307,9 @@ def _outer(points: NDArray[np.float32]) -> NDArray[np.float32]:
     for face in faces:
         a, b, c = few[list(face[:3])]
         u, v, w = b - a, c - a, place - a
-        left, right = u[[1, 2, 0]] * v[[2, 0, 1]], u[[2, 0, 1]] * v[[1, 2, 0]]
-        bound = abs(w) @ (abs(left) + abs(right)) * ROUNDING_SHARE
-        inside &= w @ (left - right) < -bound
+        plus, minus = u[[1, 2, 0]] * v[[2, 0, 1]], u[[2, 0, 1]] * v[[1, 2, 0]]
+        bound = abs(w) @ (abs(plus) + abs(minus)) * ROUNDING_SHARE
+        inside &= w @ (plus - minus) < -bound
     return points[~inside]
 
 

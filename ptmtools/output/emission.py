@@ -36,7 +36,7 @@ from ptmtools.files import real_folder, refuse_existing, write_bytes, writing
 from ptmtools.output.content import Content, EmitExtras
 from ptmtools.output.emitter import GZIP, Emitter, File
 from ptmtools.output.emitters import chosen_emitters
-from ptmtools.output.model import EmitReport, TextureRecord, Visit
+from ptmtools.output.model import EmitReport, TextureRecord, VisitCost
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, mesh_path, path_of
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.viewpoints import place_viewpoints
@@ -94,7 +94,7 @@ def write_files(
     return ordered(write, files, _WRITER_THREADS)
 
 
-def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
+def visit_of(content: Content, sizes: Mapping[str, int]) -> VisitCost:
     """The cost of a visit.
 
     ``sizes``: bytes of each file, by its path in the served folder.
@@ -127,17 +127,17 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     shares: tuple[float, float] | tuple[None, None] = (None, None)
     if len(used):
         shares = over_places(sees @ texels / texels[used].sum(), pvs.viewers)
-    mean, most = over_places(at_hand, pvs.viewers)
+    mean, greatest = over_places(at_hand, pvs.viewers)
     until = _until_shares(content, geometry, paints, whole)
     volume = pvs.volume_at_hand
     images = sum(records[i].fallback_bytes for i in used.tolist() if content.options.fallback)
     browsed = [sizes[f.entry] + int(_geometry(content, f, sizes).sum()) for f in forms if f.entry]
-    return Visit(
+    return VisitCost(
         browser=browsed[0] + images if browsed else None,
         first_room=int(sum(opening)),
         simplified=int(sum(opening) - meshes[pvs.row(first)].sum()) if content.meshes else None,
         mean_at_hand=round(mean),
-        most_at_hand=round(most),
+        most_at_hand=round(greatest),
         mean_90=round(over_places(until[:, 0], pvs.viewers)[0]),
         mean_99=round(over_places(until[:, 1], pvs.viewers)[0]),
         everything=int(geometry.sum() + whole[used].sum()),
@@ -224,7 +224,7 @@ def emit(
     folder = Path(out)
     _check(scene, cells, pvs, ach, textures)
     emitters = chosen_emitters(options.format)
-    for name in _owned(emitters) if not extras.force else ():
+    for name in _owned_names(emitters) if not extras.force else ():
         remedy = "specify another folder, or use --force to overwrite it"
         refuse_existing(folder / name, remedy)
     images = tuple(record for record in textures if record.image >= 0)
@@ -246,14 +246,14 @@ def emit(
     )
 
 
-def _owned(emitters: Iterable[Emitter]) -> list[str]:
+def _owned_names(emitters: Iterable[Emitter]) -> list[str]:
     return [name for emitter in emitters for name in emitter.owns]
 
 
 def _write_forms(content: Content, folder: Path, *, gzip: bool) -> dict[str, int]:
     """Writes the files of all emitters; the bytes of each by its name."""
     written = [emitter.writer.load()(content) for emitter in content.emitters]
-    for name in _owned(content.emitters):
+    for name in _owned_names(content.emitters):
         if name.endswith("/"):
             real_folder(folder, name[:-1])
     sizes: dict[str, int] = {}

@@ -72,4 +72,6 @@ class Emitter:
     def is_owner(self, path: str) -> bool:
         """Whether a path in the served folder, or that of a gzip copy, belongs to the form."""
         plain = path.removesuffix(GZIP)
-        return any(path.startswith(own) if own.endswith("/") else plain == own for own in self.owns)
+        return any(
+            path.startswith(owned) if owned.endswith("/") else plain == owned for owned in self.owns
+        )

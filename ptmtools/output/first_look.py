@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ptmtools.output.model import TextureRecord
 
 
-class Step(NamedTuple):
+class LevelStep(NamedTuple):
     """From one level of a texture to a finer one.
 
     Attributes
@@ -44,7 +44,7 @@ class Step(NamedTuple):
     gain: float
 
 
-class Piece(NamedTuple):
+class BundlePiece(NamedTuple):
     """Bytes of a `.ptm` in a bundle that refine its texture to ``level``."""
 
     texture: int
@@ -61,25 +61,25 @@ class FirstLooks:
         side = content.options.first_look
         self._steps = [steps_of(record, side) for record in content.textures]
 
-    def pieces(self, cell: int) -> list[Piece]:
+    def pieces(self, cell: int) -> list[BundlePiece]:
         """The pieces of a cell's bundle, in order."""
         share = self._shares(cell)
         steps = [(texture, step) for texture in share for step in self._steps[texture]]
 
-        def worth(entry: tuple[int, Step]) -> tuple[float, int, int]:
+        def worth(entry: tuple[int, LevelStep]) -> tuple[float, int, int]:
             texture, step = entry
             value = step.gain * share[texture] / (step.end - step.start)
             return -value, texture, step.level
 
-        pieces: list[Piece] = []
+        pieces: list[BundlePiece] = []
         for texture, step in sorted(steps, key=worth):
             start = step.start
             if pieces and pieces[-1].texture == texture:
                 start = pieces.pop().start
-            pieces.append(Piece(texture, step.level, start, step.end))
+            pieces.append(BundlePiece(texture, step.level, start, step.end))
         return pieces
 
-    def bundle(self, pieces: Iterable[Piece]) -> bytes:
+    def bundle(self, pieces: Iterable[BundlePiece]) -> bytes:
         """The bytes of a bundle; raises InputError PTM-I120, PTM-I122 if a texture is missing."""
         return b"".join(self._heads[p.texture][p.start : p.end] for p in pieces)
 
@@ -100,7 +100,7 @@ class FirstLooks:
         content = self._content
         ach, seen = content.ach, content.pvs.row(cell)
         floor = float(ach.floor[cell])
-        shares = {t: 0.0 for other in seen.tolist() for t in content.painted[other].tolist()}
+        shares = {t: 0.0 for visible in seen.tolist() for t in content.painted[visible].tolist()}
         if ach.by_texture:
             rows = ach.entries(cell)
             of_cell = slice(*ach.texture_start[[rows.start, rows.stop]].tolist())
@@ -111,9 +111,9 @@ class FirstLooks:
                 if image in content.places.of_image:
                     shares[content.places.of_image[image][0]] += value
         else:
-            for other, value in zip(seen.tolist(), ach.row(cell).tolist(), strict=True):
+            for visible, value in zip(seen.tolist(), ach.row(cell).tolist(), strict=True):
                 for texture, part in zip(
-                    content.painted[other].tolist(), self._parts[other].tolist(), strict=True
+                    content.painted[visible].tolist(), self._parts[visible].tolist(), strict=True
                 ):
                     shares[texture] += value * part
         return {texture: max(value, floor) for texture, value in sorted(shares.items())}
@@ -125,14 +125,16 @@ class FirstLooks:
         geometry, parts = self._content.geometry, []
         of_shape, area = self._content.paint, geometry.areas()
         for cell, textures in enumerate(self._content.painted):
-            own = slice(*geometry.cell_start[cell : cell + 2].tolist())
-            whole = float(area[own].sum()) or 1.0
-            each = [float(area[own][of_shape[own] == texture].sum()) for texture in textures]
-            parts.append(np.array(each, np.float64) / whole)
+            shapes = slice(*geometry.cell_start[cell : cell + 2].tolist())
+            whole = float(area[shapes].sum()) or 1.0
+            texture_area = [
+                float(area[shapes][of_shape[shapes] == texture].sum()) for texture in textures
+            ]
+            parts.append(np.array(texture_area, np.float64) / whole)
         return parts
 
 
-def steps_of(record: TextureRecord, side: int) -> list[Step]:
+def steps_of(record: TextureRecord, side: int) -> list[LevelStep]:
     """The steps of a texture up to its finest level with no side above ``side`` texels, in order
     of decreasing gain per byte; none if the texture was not encoded."""
     if not (record.detail and record.stored):
@@ -151,11 +153,11 @@ def steps_of(record: TextureRecord, side: int) -> list[Step]:
     return list(_between(corners))
 
 
-def _slope(one: tuple[int, int, float], other: tuple[int, int, float]) -> float:
+def _slope(before: tuple[int, int, float], after: tuple[int, int, float]) -> float:
     """Gain per byte."""
-    return (other[2] - one[2]) / (other[1] - one[1])
+    return (after[2] - before[2]) / (after[1] - before[1])
 
 
-def _between(corners: list[tuple[int, int, float]]) -> Iterator[Step]:
+def _between(corners: list[tuple[int, int, float]]) -> Iterator[LevelStep]:
     for (_, start, before), (level, end, after) in pairwise(corners):
-        yield Step(level, start, end, after - before)
+        yield LevelStep(level, start, end, after - before)

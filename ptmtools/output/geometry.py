@@ -93,8 +93,8 @@ class Geometry:
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
         piece, cell = cells.emitted(scene.two_sided)
-        self.point, point_of = _welded(single(cells.vertex, "vertices"))
-        self.uv, uv_of = _welded(single(cells.vertex_uv, "texture coordinates"))
+        self.point, point_of = _weld(single(cells.vertex, "vertices"))
+        self.uv, uv_of = _weld(single(cells.vertex_uv, "texture coordinates"))
         corner = point_of[cells.triangle[piece]].reshape(-1, 3)
         flat = (corner == np.roll(corner, 1, axis=1)).any(axis=1)
         self.collapsed = int(flat.sum())
@@ -110,21 +110,21 @@ class Geometry:
         change[1:] = key[1:] != key[:-1]
         first = np.flatnonzero(change)
         shape = np.cumsum(change) - 1
-        one = order[first]
-        self.object, self.material = thing[one], material[one]
-        self.two_sided = scene.two_sided[source[one]]
+        first_piece = order[first]
+        self.object, self.material = thing[first_piece], material[first_piece]
+        self.two_sided = scene.two_sided[source[first_piece]]
         self.triangle_start = np.append(first, len(order))
-        self.cell_start = np.searchsorted(cell[one], np.arange(cells.cell_count + 1))
-        self.shape_point, self.point_start, self.triangle = _indexed(
+        self.cell_start = np.searchsorted(cell[first_piece], np.arange(cells.cell_count + 1))
+        self.shape_point, self.point_start, self.triangle = _index_rows(
             corner[order], shape, len(first), len(self.point)
         )
         self.piece = piece[order]
         self.color = _corner_colors(scene, cells, self.piece)
         self.normal = _normal_coordinates(scene, cells, self.piece)
-        own = [m.normal is not None and m.normal.own for m in scene.materials]
-        self._own_normal = np.array(own, np.bool_)[self.material]
+        has_own_map = [m.normal is not None and m.normal.own for m in scene.materials]
+        self._own_normal = np.array(has_own_map, np.bool_)[self.material]
         uv_corner = uv_of[cells.triangle[self.piece]].reshape(-1, 3)
-        self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
+        self.shape_uv, self.uv_start, self.uv_triangle = _index_rows(
             uv_corner, shape, len(first), len(self.uv)
         )
 
@@ -154,15 +154,15 @@ class Geometry:
         result.relieved = np.isin(self.object, maps.objects)
         row = np.full(len(scene.triangles), -1)
         row[np.isin(scene.triangle_object, maps.objects)] = np.arange(len(maps.uv))
-        own = np.repeat(result.relieved, np.diff(self.triangle_start))
-        source = row[cells.triangle_source[self.piece[own]]]
+        relieved = np.repeat(result.relieved, np.diff(self.triangle_start))
+        source = row[cells.triangle_source[self.piece[relieved]]]
         uv = np.zeros((len(scene.triangles), 3, 2))
         uv[row >= 0] = maps.uv
-        uv = np.clip(_carried(scene, cells, self.piece[own], uv), 0, 1)
+        uv = np.clip(_carry_over(scene, cells, self.piece[relieved], uv), 0, 1)
         result.relief = np.zeros((len(self.triangle), 3, 9), np.float32)
         # Pieces of one triangle, and neighbours, have the same numbers at a corner.
-        result.relief[own, :, :2] = np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP
-        result.relief[own, :, 2:] = maps.frame[source][:, None]
+        result.relief[relieved, :, :2] = np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP
+        result.relief[relieved, :, 2:] = maps.frame[source][:, None]
         return result
 
     def areas(self) -> NDArray[np.float64]:
@@ -204,7 +204,7 @@ def _corner_colors(
     the scene has none."""
     if scene.colors is None:
         return None
-    interpolated = _carried(scene, cells, piece, scene.colors)
+    interpolated = _carry_over(scene, cells, piece, scene.colors)
     return np.asarray(np.clip(np.rint(interpolated), 0, 255).astype(np.uint8))
 
 
@@ -214,22 +214,22 @@ def _normal_coordinates(
     """(M, 3, 2) the coordinates of pieces' corners in the normal maps that have their own."""
     if scene.normal_uv is None:
         return None
-    uv = _carried(scene, cells, piece, scene.normal_uv)
+    uv = _carry_over(scene, cells, piece, scene.normal_uv)
     return (np.rint(uv / _RELIEF_STEP) * _RELIEF_STEP).astype(np.float32)
 
 
-def _carried(
+def _carry_over(
     scene: Scene, cells: Cells, piece: NDArray[np.integer], values: NDArray[Any]
 ) -> NDArray[np.float64]:
     """(M, 3, k) at the corners of pieces, interpolated between the (T, 3, k) values of the corners
     of the scene's triangles."""
     source = cells.triangle_source[piece]
-    corners, own = scene.corners[source], values[source].astype(np.float64)
+    corners, value = scene.corners[source], values[source].astype(np.float64)
     away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
-    return np.asarray(own[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, own), away))
+    return np.asarray(value[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, value), away))
 
 
-def _indexed(
+def _index_rows(
     corner: NDArray[np.int64], shape: NDArray[np.int64], shapes: int, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """The rows used by the triangles of each shape, the start of each shape among them, and the
@@ -239,7 +239,7 @@ def _indexed(
     return used % max(count, 1), start, place.reshape(-1, 3) - start[shape][:, None]
 
 
-def _welded(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _weld(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """The distinct rows of (n, 2 or more) in lexical order, and the place of each row among them.
 
     Floats become integers of the same order, two of which are sorted as one.

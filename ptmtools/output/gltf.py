@@ -36,7 +36,7 @@ from ptmtools.glb import BINARY, JSON, glb, glb_chunks
 from ptmtools.output.content import Content
 from ptmtools.output.geometry import Shape
 from ptmtools.output.gltf_compressed import CompressedBuffer
-from ptmtools.output.gltf_shapes import PlainBuffer, Sizes, Tables, vertices_of
+from ptmtools.output.gltf_shapes import PlainBuffer, Sizes, VertexTables, vertices_of
 from ptmtools.output.model import FileError, TextureRecord, shaped
 from ptmtools.output.names import GLTF_FILES, UP, cell_name, mesh_name, mesh_path, path_of
 from ptmtools.output.representation import node_extras, replaced_objects
@@ -169,8 +169,8 @@ class MaterialWriter:
         row["extras"] = row.get("extras", {}) | extras
         if self._fallback and record.fallback is not None:
             index = self._texture(UP + quote(record.fallback), use.wrap_s, use.wrap_t)
-            other = {"texCoord": coords} if coords else {}
-            row["normalTexture"] = {"index": index, **other} | (
+            coordinates = {"texCoord": coords} if coords else {}
+            row["normalTexture"] = {"index": index, **coordinates} | (
                 {"scale": use.scale} if scale else {}
             )
 
@@ -245,22 +245,27 @@ def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
     count = content.cells.cell_count
     for cell in range(count):
         content.extras.progress(cell, count, "glTF")
-        yield path_of(cell, GLTF_FILES), _glb(content, cell, cell_name(cell), _drawn(content, cell))
+        yield (
+            path_of(cell, GLTF_FILES),
+            _glb(content, cell, cell_name(cell), _drawn_shapes(content, cell)),
+        )
     content.extras.progress(count, count, "glTF")
     for mesh in content.meshes:
-        own = [s for s in content.lit.shapes(mesh.cell) if s.object == mesh.object]
-        finer: list[tuple[Tables, Iterable[Shape]]] = [(m, m.shapes) for m in mesh.levels[1:]]
-        for number, (tables, shapes) in zip(mesh.files, [*finer, (content.lit, own)], strict=True):
+        finest = [s for s in content.lit.shapes(mesh.cell) if s.object == mesh.object]
+        finer: list[tuple[VertexTables, Iterable[Shape]]] = [(m, m.shapes) for m in mesh.levels[1:]]
+        for number, (tables, shapes) in zip(
+            mesh.files, [*finer, (content.lit, finest)], strict=True
+        ):
             drawn = ((tables, shape, None) for shape in shapes)
             yield mesh_path(number), _glb(content, mesh.cell, mesh_name(number), drawn)
 
 
 #: A shape, the tables that it refers to, and the row of its object's levels in the hints if its
 #: mesh is the coarsest.
-_Drawn = tuple[Tables, Shape, int | None]
+_Drawn = tuple[VertexTables, Shape, int | None]
 
 
-def _drawn(content: Content, cell: int) -> Iterator[_Drawn]:
+def _drawn_shapes(content: Content, cell: int) -> Iterator[_Drawn]:
     """The shapes of a cell, of objects with levels those of the coarsest mesh."""
     done = set()
     for shape in content.lit.shapes(cell):

@@ -53,7 +53,7 @@ _WHOLE_BYTES = 0
 
 
 @dataclass(frozen=True)
-class _Part:
+class _BufferPart:
     """A shape on the grids.
 
     Attributes
@@ -93,7 +93,7 @@ class CompressedBuffer:
     def __init__(self, exponent: int) -> None:
         """``exponent``: of the step of positions."""
         self._exponent = exponent
-        self._parts: list[_Part] = []
+        self._parts: list[_BufferPart] = []
         self._accessors: list[dict[str, Any]] = []
         self._views: list[dict[str, Any]] = []
         self._streams: list[bytes] = []
@@ -105,12 +105,12 @@ class CompressedBuffer:
         step = np.zeros((len(vertices.point), _BOTH), dtype=np.int64)
         exponent = np.array([self._exponent] * _PLACED + [0] * (_BOTH - _PLACED))
         step[:, :_PLACED] = _steps(vertices.point, exponent[:_PLACED])
-        each = vertices.uv, vertices.light, vertices.normal
-        for first, coordinates, size in zip((_PLACED, _TEXTURED, _LIT), each, sizes, strict=True):
+        mapped = vertices.uv, vertices.light, vertices.normal
+        for first, coordinates, size in zip((_PLACED, _TEXTURED, _LIT), mapped, sizes, strict=True):
             if coordinates is not None:
-                own = slice(first, first + 2)
-                exponent[own] = texture_exponents(coordinates, *(size or (1, 1)))
-                step[:, own] = _steps(coordinates, exponent[own])
+                pair = slice(first, first + 2)
+                exponent[pair] = texture_exponents(coordinates, *(size or (1, 1)))
+                step[:, pair] = _steps(coordinates, exponent[pair])
         columns = step if vertices.color is None else np.hstack([step, vertices.color])
         _, first, place = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         corner = step[vertices.triangle, :3]
@@ -122,9 +122,9 @@ class CompressedBuffer:
         color = None if vertices.color is None else vertices.color[rows]
         frame = None if vertices.frame is None else _steps(vertices.frame[rows], _FRAME)
         primitive = {"attributes": {}, "indices": 0, "material": material}
-        textured, lit, both = (coordinates is not None for coordinates in each)
+        textured, lit, both = (coordinates is not None for coordinates in mapped)
         self._parts.append(
-            _Part(
+            _BufferPart(
                 primitive,
                 material,
                 step[rows],
@@ -146,7 +146,7 @@ class CompressedBuffer:
             self._encode(sorted(parts, key=lambda p: p.material), *kind)
 
     def _encode(
-        self, parts: list[_Part], lit: bool, normal: bool, framed: bool, painted: bool
+        self, parts: list[_BufferPart], lit: bool, normal: bool, framed: bool, painted: bool
     ) -> None:
         step = np.concatenate([part.step for part in parts])
         exponent = np.repeat([p.exponent for p in parts], [len(p.step) for p in parts], axis=0)
@@ -190,7 +190,10 @@ class CompressedBuffer:
         self._triangles(parts, count, (attributes, both))
 
     def _triangles(
-        self, parts: list[_Part], count: int, attributes: tuple[dict[str, int], dict[str, int]]
+        self,
+        parts: list[_BufferPart],
+        count: int,
+        attributes: tuple[dict[str, int], dict[str, int]],
     ) -> None:
         """``attributes``: of shapes without and with texture coordinates."""
         first = np.cumsum([0] + [len(part.step) for part in parts]).tolist()

@@ -114,10 +114,10 @@ def read_glb(data: bytes) -> ReadGlb:
         schemas.check(document, schemas.GLB)
     except schemas.ShapeError as fault:
         raise FileError("PTM-D731", fault.place or "document", fault.message) from None
-    return _Reader(document, binary).cell()
+    return _GlbReader(document, binary).cell()
 
 
-class _Reader:
+class _GlbReader:
     def __init__(self, document: dict[str, Any], binary: bytes) -> None:
         self._tree = document
         buffers = document.get("buffers", [])
@@ -180,14 +180,14 @@ class _Reader:
             raise FileError("PTM-D731", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
         if self._compressed:  # the shapes of a cell share their arrays
-            own = slice(int(index.min()), int(index.max()) + 1)
-            triangle -= own.start
-            point = point[own]
-            uv = None if uv is None else uv[own]
-            light = None if light is None else light[own]
-            third = None if third is None else third[own]
-            frame = None if frame is None else frame[own]
-            color = None if color is None else color[own]
+            used = slice(int(index.min()), int(index.max()) + 1)
+            triangle -= used.start
+            point = point[used]
+            uv = None if uv is None else uv[used]
+            light = None if light is None else light[used]
+            third = None if third is None else third[used]
+            frame = None if frame is None else frame[used]
+            color = None if color is None else color[used]
         material = self._material(primitive["material"])
         if light is not None and material.texture is None:
             uv = None  # the second coordinates once more
@@ -270,7 +270,7 @@ class _Reader:
         unit = np.dtype(COMPONENTS[component]).itemsize
         size = ITEMS[form] * unit
         if self._compressed:
-            view, data = self._decoded(accessor["bufferView"], target)
+            view, data = self._decode_view(accessor["bufferView"], target)
         else:
             view, data = self._row("bufferViews", accessor["bufferView"]), self._data
             self._row("buffers", view["buffer"])
@@ -285,7 +285,7 @@ class _Reader:
             raise FileError("PTM-D731", place, f"begins at byte {begin}, not a multiple of {unit}")
         return rows
 
-    def _decoded(self, index: int, target: int) -> tuple[dict[str, Any], bytes]:
+    def _decode_view(self, index: int, target: int) -> tuple[dict[str, Any], bytes]:
         """A compressed view and its bytes, as a view of those bytes alone."""
         if index in self._views:
             return self._views[index]
@@ -308,9 +308,9 @@ class _Reader:
             data = decode(self._data[begin : begin + length], coded)
         except ValueError as fault:
             raise FileError("PTM-D731", place, str(fault)) from None
-        own = {name: view[name] for name in view if name in ("byteLength", "byteStride")}
-        self._views[index] = own, data
-        return own, data
+        layout = {name: view[name] for name in view if name in ("byteLength", "byteStride")}
+        self._views[index] = layout, data
+        return layout, data
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
         place, accessor = f"accessors[{index}]", self._tree["accessors"][index]

@@ -17,7 +17,7 @@ from ptmtools.scene.colors import packed, to_linear, unpacked
 _WHOLE = 1e15
 
 
-class Tables(Protocol):
+class VertexTables(Protocol):
     """The rows that shapes refer to.
 
     Attributes
@@ -57,15 +57,15 @@ class Vertices:
     normal: NDArray[np.float32] | None = None
 
 
-def vertices_of(tables: Tables, shape: Shape, *, textured: bool) -> Vertices:
+def vertices_of(tables: VertexTables, shape: Shape, *, textured: bool) -> Vertices:
     """The vertices of a shape in the order of their first use."""
     # A vertex for each that differs in position, texture coordinates, colour or light.
     width = len(shape.uv) if textured else 1
     corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
     vertex, triangle = by_first_use(corner)
     second = None
-    own = None if shape.relief is not None else shape.normal
-    parts = [shape.light if shape.relief is None else shape.relief, own]
+    of_material = None if shape.relief is not None else shape.normal
+    parts = [shape.light if shape.relief is None else shape.relief, of_material]
     present = [rows for rows in parts if rows is not None]
     if present:
         rows = np.concatenate(present, axis=2)

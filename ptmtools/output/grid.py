@@ -56,25 +56,25 @@ def texture_exponents(uv: NDArray[np.floating], width: int, height: int) -> tupl
     """Exponents of the steps of (n, 2) coordinates of a texture, across and up."""
     largest = np.abs(uv).max(axis=0, initial=0.0).tolist()
     u, v = (
-        max(-math.ceil(math.log2(_IN_TEXEL * side)), _least(most))
-        for side, most in zip((width, height), largest, strict=True)
+        max(-math.ceil(math.log2(_IN_TEXEL * side)), _least(extreme))
+        for side, extreme in zip((width, height), largest, strict=True)
     )
     return u, v
 
 
-def _least(most: float) -> int:
+def _least(largest: float) -> int:
     """The exponent of the least step of which 24 bits hold enough for a number."""
-    return math.ceil(math.log2(max(most / MOST, 2.0**_FINEST)))
+    return math.ceil(math.log2(max(largest / MOST, 2.0**_FINEST)))
 
 
 def least_thickness(corners: NDArray[np.float64], tolerance: Tolerance) -> float:
     """Least distance of parallel (n, 3, 3) triangles that face each other or turn their backs,
     metres; at most that for the coarsest step. Nearer ones than ``tolerance.plane`` are one."""
-    most = _IN_THICKNESS * 2.0**COARSEST
+    limit = _IN_THICKNESS * 2.0**COARSEST
     area = areas(corners)
     corners, area = corners[area > 0], area[area > 0]
     if not len(corners):
-        return most
+        return limit
     normal = normals(corners) / (2 * area[:, None])
     points = corners.reshape(-1, 3)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -86,15 +86,15 @@ def least_thickness(corners: NDArray[np.float64], tolerance: Tolerance) -> float
         hits = tree.run(
             (middle + near * way).astype(np.float32),
             way.astype(np.float32),
-            dists=np.full(len(way), most / tolerance.extent, np.float32),
+            dists=np.full(len(way), limit / tolerance.extent, np.float32),
             output=True,
         )
-        other = hits["primID"]
-        cosine = np.abs((normal * normal[other]).sum(axis=1))
-        parallel = (other >= 0) & (cosine >= tolerance.cosine)
-        far = (hits["tfar"].astype(np.float64) + near) * tolerance.extent
-        thickness.append(np.where(parallel, far, np.inf))
+        opposite = hits["primID"]
+        cosine = np.abs((normal * normal[opposite]).sum(axis=1))
+        parallel = (opposite >= 0) & (cosine >= tolerance.cosine)
+        distance = (hits["tfar"].astype(np.float64) + near) * tolerance.extent
+        thickness.append(np.where(parallel, distance, np.inf))
     least = np.minimum(*thickness)
     order = np.argsort(least, kind="stable")
     thin = np.cumsum(area[order]) > DUST * area.sum()
-    return min(most, float(least[order][np.argmax(thin)]))
+    return min(limit, float(least[order][np.argmax(thin)]))

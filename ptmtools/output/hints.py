@@ -41,7 +41,7 @@ from ptmtools.texture.model import gpu_texel_bytes
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.output.content import Content
-    from ptmtools.output.first_look import Piece
+    from ptmtools.output.first_look import BundlePiece
     from ptmtools.output.mesh_levels import MeshLevels
     from ptmtools.texture.model import Level
 
@@ -136,7 +136,7 @@ def _texture(record: TextureRecord, objects: Sequence[str], fallback: bool) -> d
         if any(record.detail.offsets):
             row["offsets"] = list(record.detail.offsets)
     if record.previews:
-        row["previews"] = [_preview(each) for each in record.previews]
+        row["previews"] = [_preview(preview) for preview in record.previews]
     if record.cell >= 0:
         row["light"] = record.cell
     if record.object >= 0:
@@ -175,15 +175,17 @@ def _boxes(content: Content) -> list[Any]:
         end.reduceat(cells.leaf_point, cells.leaf_point_start[:-1], axis=0)
         for end in (np.minimum, np.maximum)
     )
-    box = np.array([[*low[own].min(axis=0), *high[own].max(axis=0)] for own in content.leaves])
+    box = np.array(
+        [[*low[leaves].min(axis=0), *high[leaves].max(axis=0)] for leaves in content.leaves]
+    )
     decimals = 2 - math.floor(math.log10(cells.tolerance.extent))
     rounded = np.concatenate(
-        [_rounded_down(box[:, :3], decimals), -_rounded_down(-box[:, 3:], decimals)], axis=1
+        [_round_down(box[:, :3], decimals), -_round_down(-box[:, 3:], decimals)], axis=1
     )
     return [[int(v) if v.is_integer() else v for v in row] for row in (rounded + 0.0).tolist()]
 
 
-def _rounded_down(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
+def _round_down(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
     """To a whole multiple of 10 ** -decimals, not above the value."""
     step = 10.0**-decimals
     lower = np.round(np.floor(values / step) * step, decimals)
@@ -204,7 +206,7 @@ class RecordWriter:
         self._portals = _portals(content.cells)
         self._leaves = leaf_numbers(content.cells, slack_of(content.cells))
 
-    def record(self, cell: int, first_look: Sequence[Piece] | None) -> str:
+    def record(self, cell: int, first_look: Sequence[BundlePiece] | None) -> str:
         """The text of a cell's record; ``first_look`` is its bundle; None if the database has none.
 
         Raises DatabaseError PTM-D601.
@@ -221,7 +223,7 @@ class RecordWriter:
             "visible": visible,
             "ach": content.shares[cell],
             "floor": significant(content.ach.floor[cell : cell + 1])[0],
-            "textures": [content.painted[other].tolist() for other in visible],
+            "textures": [content.painted[seen].tolist() for seen in visible],
         }
         if content.ach.by_texture:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
@@ -242,7 +244,7 @@ class RecordWriter:
     def _need(self, need: Need, cell: int) -> list[list[Any]]:
         """For each visible texture its index, the coarsest required level, and shares."""
         content, cells = self._content, self._content.pvs.row(cell).tolist()
-        visible = {place for other in cells for place in content.painted[other].tolist()}
+        visible = {place for seen in cells for place in content.painted[seen].tolist()}
         images = {image: place for image, (place, _) in content.places.of_image.items()}
         maps = dict(enumerate(place for place, _ in content.places.of_object.values()))
         rows = []
@@ -264,9 +266,9 @@ class RecordWriter:
         if not content.places.of_cell:
             return
         shares = significant(content.ach.value[content.ach.entries(cell)], NEED_DIGITS)
-        for other, share in zip(content.pvs.row(cell).tolist(), shares, strict=True):
-            if share and other in content.places.of_cell:
-                place, record = content.places.of_cell[other]
+        for seen, share in zip(content.pvs.row(cell).tolist(), shares, strict=True):
+            if share and seen in content.places.of_cell:
+                place, record = content.places.of_cell[seen]
                 yield [place, record.level_count - 1, share]
 
     def _texture_shares(self, entry: int) -> list[list[Any]]:
@@ -317,13 +319,13 @@ def statistics_text(content: Content) -> str:
 
 def _cell(content: Content, cell: int) -> dict[str, Any]:
     ach = content.ach
-    rows, own = ach.entries(cell), slice(cell, cell + 1)
+    rows, this_cell = ach.entries(cell), slice(cell, cell + 1)
     return {
         "samples": int(ach.samples[cell]),
         "rejected": int(ach.rejected[cell]),
-        "missed": significant(ach.missed[own])[0],
-        "uncertain": significant(ach.uncertain[own])[0],
-        "unseenBelow": significant(ach.unseen_below[own])[0],
+        "missed": significant(ach.missed[this_cell])[0],
+        "uncertain": significant(ach.uncertain[this_cell])[0],
+        "unseenBelow": significant(ach.unseen_below[this_cell])[0],
         "error": significant(ach.error[rows]),
         "p95": significant(ach.p95[rows]),
         "seen": significant(ach.seen[rows]),

@@ -41,7 +41,7 @@ MISSED = 2
 
 
 @dataclass(frozen=True)
-class Level:
+class DetailLevel:
     """A simplified mesh of an object.
 
     Attributes
@@ -72,7 +72,7 @@ class MeshLevels:
     cell: int
     object: int
     box: NDArray[np.float32]
-    levels: tuple[Level, ...]
+    levels: tuple[DetailLevel, ...]
     first: int
 
     @property
@@ -118,12 +118,12 @@ def _heavy(geometry: Geometry, left_out: Collection[int]) -> Iterator[tuple[int,
                 yield cell, range(a, b)
 
 
-def _levels(geometry: Geometry, shapes: Sequence[Shape]) -> tuple[Level, ...]:
+def _levels(geometry: Geometry, shapes: Sequence[Shape]) -> tuple[DetailLevel, ...]:
     from ptmtools.simplification import SimplifyOptions, simplify
 
-    mesh = _joined(geometry, shapes)
+    mesh = _join_shapes(geometry, shapes)
     size = float(np.linalg.norm(np.ptp(mesh.points, axis=0))) / 2
-    levels: list[Level] = []
+    levels: list[DetailLevel] = []
     error = 0.0
     while (faces := len(mesh.triangles) // SHARE) >= FEWEST:
         simplified = simplify(mesh, SimplifyOptions(faces, keep_parts=True))
@@ -135,7 +135,7 @@ def _levels(geometry: Geometry, shapes: Sequence[Shape]) -> tuple[Level, ...]:
     return tuple(levels)
 
 
-def _joined(geometry: Geometry, shapes: Sequence[Shape]) -> Mesh:
+def _join_shapes(geometry: Geometry, shapes: Sequence[Shape]) -> Mesh:
     """One mesh of shapes, the materials of which are their places."""
     from ptmtools.simplification import Mesh
 
@@ -146,8 +146,8 @@ def _joined(geometry: Geometry, shapes: Sequence[Shape]) -> Mesh:
     colors = None
     if any(shape.color is not None for shape in shapes):
         white = [np.full((n, 3, 3), 255, np.uint8) for n in count]
-        own = [w if s.color is None else s.color for w, s in zip(white, shapes, strict=True)]
-        colors = np.concatenate(own)
+        painted = [w if s.color is None else s.color for w, s in zip(white, shapes, strict=True)]
+        colors = np.concatenate(painted)
     coordinates = geometry.uv[uv].astype(np.float64)
     return Mesh(
         geometry.point[used].astype(np.float64),
@@ -158,19 +158,19 @@ def _joined(geometry: Geometry, shapes: Sequence[Shape]) -> Mesh:
     )
 
 
-def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> Level:
+def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> DetailLevel:
     uv = np.zeros((len(mesh.triangles), 3, 2)) if mesh.uv is None else mesh.uv
     table, corner = np.unique(uv.reshape(-1, 2).astype(np.float32), axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)
     assert mesh.material is not None
     parts = []
     for place, shape in enumerate(shapes):
-        own = np.flatnonzero(mesh.material == place)
-        if not len(own):
+        selected = np.flatnonzero(mesh.material == place)
+        if not len(selected):
             continue
-        point, triangle = _used(mesh.triangles[own])
-        coordinates, uv_triangle = _used(corner[own])
-        color = None if mesh.colors is None or shape.color is None else mesh.colors[own]
+        point, triangle = _compact(mesh.triangles[selected])
+        coordinates, uv_triangle = _compact(corner[selected])
+        color = None if mesh.colors is None or shape.color is None else mesh.colors[selected]
         parts.append(
             Shape(
                 shape.object,
@@ -183,10 +183,10 @@ def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> Level:
                 color,
             )
         )
-    return Level(mesh.points.astype(np.float32), table, tuple(parts), error)
+    return DetailLevel(mesh.points.astype(np.float32), table, tuple(parts), error)
 
 
-def _used(corner: NDArray[np.integer]) -> tuple[Ints, Ints]:
+def _compact(corner: NDArray[np.integer]) -> tuple[Ints, Ints]:
     used, place = np.unique(corner, return_inverse=True)
     return used.astype(np.int64), place.reshape(-1, 3).astype(np.int64)
 

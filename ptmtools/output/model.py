@@ -151,7 +151,7 @@ class Viewpoint:
     cell: int
 
 
-def _given(viewpoints: Sequence[tuple[float, ...]]) -> tuple[GivenViewpoint, ...]:
+def _parse_viewpoint(viewpoints: Sequence[tuple[float, ...]]) -> tuple[GivenViewpoint, ...]:
     """Viewpoints of (x, y, z[, yaw])."""
     return tuple(
         GivenViewpoint((x, y, z), rest[0] if rest else None) for x, y, z, *rest in viewpoints
@@ -197,7 +197,7 @@ class WriterOptions:
         name="viewpoint",
         metavar="X,Y,Z[,YAW]",
         numbers=(3, 4),
-        parse=_given,
+        parse=_parse_viewpoint,
         print=_numbers,
     )
     viewpoint_count: int = option(
@@ -275,7 +275,7 @@ def refused(problem: str) -> InputError:
 
 
 @dataclass(frozen=True)
-class Visit:
+class VisitCost:
     """The cost of a visit, see `ptmtools.output.emission`.
 
     Attributes
@@ -329,7 +329,7 @@ class EmitReport:
     collapsed: int
     bytes: int
     first_look: int
-    visit: Visit
+    visit: VisitCost
     notes: tuple[str, ...] = ()
 
 
@@ -390,5 +390,5 @@ def storey_name(scene: Scene, floor: float, gap: float) -> str:
     none that is nearer than half of ``gap``, metres. Floors that far apart are different storeys'.
     """
     near = [(abs(storey.height - floor), storey.name) for storey in scene.storeys]
-    distance, name = min(near, key=lambda one: one[0], default=(gap, ""))
+    distance, name = min(near, key=lambda pair: pair[0], default=(gap, ""))
     return name if distance < gap / 2 else ""

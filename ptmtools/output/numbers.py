@@ -68,10 +68,10 @@ def row_texts(values: NDArray[np.floating] | NDArray[np.integer]) -> list[str]:
 def _json(values: NDArray[Any]) -> str:
     """The JSON of an array, each number in its shortest form."""
     size = abs(values)
-    other = (size >= _EXACT) | ((size >= _THOUSAND) & (size % _THOUSAND == 0))
-    other |= (size < _SMALL) & (size > 0)
-    rare = values[other]
-    text = _plain(np.where(other, np.float32(np.nan), values))
+    special = (size >= _EXACT) | ((size >= _THOUSAND) & (size % _THOUSAND == 0))
+    special |= (size < _SMALL) & (size > 0)
+    rare = values[special]
+    text = _plain(np.where(special, np.float32(np.nan), values))
     text = text.replace(".0,", ",").replace(".0]", "]")
     if not len(rare):
         return text

@@ -212,9 +212,9 @@ class _Plan:
         shades = ScalarMappable(LogNorm(_FAINTEST, 1), _SHADES)
         for i, floor in enumerate(self._floors):
             row, column = divmod(i, columns)
-            left = _MARGIN + column * (panel + _GAP)
+            edge = _MARGIN + column * (panel + _GAP)
             bottom = height - head - (row + 1) * (_CAPTION + tall + _FOOT) + _FOOT
-            axis = figure.add_axes((left / width, bottom / height, panel / width, tall / height))
+            axis = figure.add_axes((edge / width, bottom / height, panel / width, tall / height))
             axis.set_axis_off()
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
             self._storey(axis, floor, shades, panel)

@@ -144,7 +144,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         bodies = [_bytes(file) for file in files]
         mesh_bytes.append(tuple(map(on_link, bodies)))
         whole = _glb(files[-1], bodies[-1], row["cell"], index)
-        geometry[row["cell"]] = _refined(geometry[row["cell"]], number, whole)
+        geometry[row["cell"]] = _refine(geometry[row["cell"]], number, whole)
     locator = Locator(records)
     return Served(
         folder,
@@ -241,7 +241,7 @@ def _glb(file: Path, data: bytes, cell: int, index: Mapping[str, Any]) -> ReadGl
             "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
     named = ((p.material.texture, p.material.light, p.material.normal) for p in read.primitives)
-    used = [number for each in named for number in each if number is not None]
+    used = [number for numbers in named for number in numbers if number is not None]
     out_of_range = max(used, default=-1) >= len(index["textures"])
     for kind in representations():
         rows = [p.extras[kind.member] for p in read.primitives if kind.member in p.extras]
@@ -251,7 +251,7 @@ def _glb(file: Path, data: bytes, cell: int, index: Mapping[str, Any]) -> ReadGl
     return read
 
 
-def _refined(cell: ReadGlb, mesh: int, whole: ReadGlb) -> ReadGlb:
+def _refine(cell: ReadGlb, mesh: int, whole: ReadGlb) -> ReadGlb:
     """A cell with an object as modelled in place of its coarsest mesh."""
-    others = (each for each in cell.primitives if each.material.mesh != mesh)
+    others = (primitive for primitive in cell.primitives if primitive.material.mesh != mesh)
     return replace(cell, primitives=(*others, *whole.primitives))

@@ -1,9 +1,9 @@
 """Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at eye
 height, away from the walls, with the best view (`views`). A room that the model names has one only.
 
-`Ground` finds the floor below a point: the nearest upward-facing surface. The squares of a grid in
-plan list the floor triangles whose boxes they touch, so that a query looks at the triangles of one
-square.
+`FloorFinder` finds the floor below a point: the nearest upward-facing surface. The squares of a
+grid in plan list the floor triangles whose boxes they touch, so that a query looks at the triangles
+of one square.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _FLOOR_SLOPE = np.cos(np.pi / 4)
 _SQUARES = 128
 
 
-class Ground:
+class FloorFinder:
     """The floors of a scene."""
 
     def __init__(self, scene: Scene) -> None:
@@ -104,7 +104,7 @@ _AROUND = np.array(
 
 
 @dataclass(frozen=True)
-class Place:
+class Standpoint:
     """A place to stand in a cell.
 
     Attributes
@@ -133,8 +133,8 @@ class _Room:
 
 
 def places(
-    cells: Cells, ground: Ground, outlook: Outlook, avatar_size: Vector, count: int
-) -> list[Place]:
+    cells: Cells, ground: FloorFinder, outlook: Outlook, avatar_size: Vector, count: int
+) -> list[Standpoint]:
     """At most ``count`` places: first the best view among the largest rooms of a storey, then the
     rooms with the largest floors."""
     eye = avatar_size[1]
@@ -144,9 +144,9 @@ def places(
         section = leaf_section(cells, leaf, floor + eye)
         if len(section) >= 3:
             rooms.append(_Room(leaf, floor, section))
-    by_room: dict[int, Place] = {}
+    by_room: dict[int, Standpoint] = {}
     numbers = cells.room_numbers.tolist()
-    begin: list[Place] = []
+    begin: list[Standpoint] = []
     least = 0.0
     for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
         number, size = numbers[cells.leaf_cell[room.leaf]], area(room.section)
@@ -179,7 +179,7 @@ def largest_leaves(cells: Cells, count: int) -> list[int]:
     return leaves
 
 
-def _floor(cells: Cells, leaf: int, ground: Ground) -> float:
+def _floor(cells: Cells, leaf: int, ground: FloorFinder) -> float:
     """The height of the floor of a leaf: the median over a grid, so that a table in its middle does
     not count."""
     middle = cells.leaf_points(leaf).mean(axis=0)
@@ -192,15 +192,15 @@ def _floor(cells: Cells, leaf: int, ground: Ground) -> float:
 def _place_in(
     room: _Room,
     cells: Cells,
-    ground: Ground,
+    ground: FloorFinder,
     outlook: Outlook,
     avatar_size: Vector,
-) -> Place | None:
+) -> Standpoint | None:
     keep_off, eye, step = avatar_size
     grid, walls = _grid(room.section), outlook.walls(room.floor + eye)
     # A wall outside of the section is farther off than the section's own sides.
-    least, most = room.section.min(axis=0), room.section.max(axis=0)
-    near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= most)).all(axis=1)
+    least, greatest = room.section.min(axis=0), room.section.max(axis=0)
+    near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= greatest)).all(axis=1)
     sides = np.stack([room.section, np.roll(room.section, -1, axis=0)], axis=1)
     clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, sides))
     grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
@@ -208,20 +208,20 @@ def _place_in(
     floor = ground.below(position)
     position[:, 1] = floor + eye
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
-    left, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
-    while len(left) and len(tried) < _TRIES:
-        batch, left = left[:_TRIES], left[_TRIES:]
+    waiting, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
+    while len(waiting) and len(tried) < _TRIES:
+        batch, waiting = waiting[:_TRIES], waiting[_TRIES:]
         level = _level(position[batch], floor[batch], ground, keep_off)
         tried = np.append(tried, batch[level])[:_TRIES]
     if len(tried) == 0:
         return None
     view = outlook.best(position[tried], room.floor + eye)
     cell, i = int(cells.leaf_cell[room.leaf]), tried[view.place]
-    return Place(cell, position[i], view.yaw, view.worth, float(floor[i]))
+    return Standpoint(cell, position[i], view.yaw, view.worth, float(floor[i]))
 
 
 def _level(
-    position: NDArray[np.float64], floor: NDArray[np.float64], ground: Ground, radius: float
+    position: NDArray[np.float64], floor: NDArray[np.float64], ground: FloorFinder, radius: float
 ) -> NDArray[np.bool_]:
     """(n,) whether no floor around (n, 3) positions lies above the one at the position itself."""
     around = np.repeat(position[:, None], len(_AROUND), axis=1)
@@ -233,9 +233,9 @@ def _level(
 def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, 2) points of a regular grid that lie inside a convex counter-clockwise polygon."""
     share = (np.arange(_GRID) + 0.5) / _GRID
-    least, most = polygon.min(axis=0), polygon.max(axis=0)
+    least, greatest = polygon.min(axis=0), polygon.max(axis=0)
     grid = np.stack(np.meshgrid(share, share, indexing="ij"), axis=-1).reshape(-1, 2)
-    points = least + grid * (most - least)
+    points = least + grid * (greatest - least)
     a, b = polygon, np.roll(polygon, -1, axis=0)
     edge, to = b - a, points[:, None] - a
     inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)

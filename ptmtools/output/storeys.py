@@ -111,8 +111,8 @@ def storeys(cells: Cells, height: float, gap: float) -> list[float]:
     areas = [sum(floors[low] for low in cluster) for cluster in clusters]
     # The floor of a storey is the height with the most area on it.
     heights = [max(cluster, key=lambda low: floors[low]) for cluster in clusters]
-    most = max(areas)
-    return [h for h, a in zip(heights, areas, strict=True) if a >= _LEAST_SHARE * most]
+    largest = max(areas)
+    return [h for h, a in zip(heights, areas, strict=True) if a >= _LEAST_SHARE * largest]
 
 
 def storey_of(floors: Sequence[float], height: float) -> int:

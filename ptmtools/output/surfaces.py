@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
-from ptmtools.output.bumps import Bumps, bumps_of, corners_of
 from ptmtools.output.gltf import WRAPS
 from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive
 from ptmtools.output.locating import SLACK, Locator
@@ -39,6 +38,24 @@ class MappedRelief:
     number: NDArray[np.int32]
     uv: Floats
     frame: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Bumps:
+    """The normal maps of materials on triangles.
+
+    Attributes
+    ----------
+    number: (n,) int32, the normal map in the hints, -1 without.
+    uv: (n, 3, 2) float64 coordinates in it, origin at the upper left; 0 without one.
+    scale: (n,) factor of x and y of its normals.
+    clamped: (n, 2) as in `Surfaces`.
+    """
+
+    number: NDArray[np.int32]
+    uv: Floats
+    scale: Floats
+    clamped: Bools
 
 
 @dataclass(frozen=True)
@@ -130,23 +147,23 @@ def sides(corner: Floats, cell: NDArray[np.int32], two_sided: Bools, locator: Lo
     locator: of the cells.
     """
     visible = np.repeat(np.arange(len(corner))[:, None], 2, axis=1)
-    one, other = _pairs(corner, np.flatnonzero(two_sided))
-    apart = cell[one] != cell[other]
-    one = np.concatenate([one[apart], np.unique(one[apart])])
-    other = np.concatenate([other[apart], np.unique(other[apart])])
-    normal = normals(corner[one])
+    first, second = _pairs(corner, np.flatnonzero(two_sided))
+    apart = cell[first] != cell[second]
+    first = np.concatenate([first[apart], np.unique(first[apart])])
+    second = np.concatenate([second[apart], np.unique(second[apart])])
+    normal = normals(corner[first])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     step = SLACK * np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     for side, away in enumerate((step, -step)):
-        point = corner[one].mean(axis=1) + away
-        outside = np.empty(len(one))
-        for c in np.unique(cell[other]).tolist():
-            rows = np.flatnonzero(cell[other] == c)
+        point = corner[first].mean(axis=1) + away
+        outside = np.empty(len(first))
+        for c in np.unique(cell[second]).tolist():
+            rows = np.flatnonzero(cell[second] == c)
             outside[rows] = locator.outside(c, point[rows])
         # The copy in the cell that the point is deepest in comes last and wins.
-        order = np.lexsort((-outside, one))
+        order = np.lexsort((-outside, first))
         order = order[outside[order] < SLACK / 2]
-        visible[one[order], side] = other[order]
+        visible[first[order], side] = second[order]
     return visible
 
 
@@ -229,10 +246,10 @@ def _relief(shapes: list[ReadPrimitive]) -> MappedRelief | None:
     frame = np.zeros((count, 7), np.float32)
     end = 0
     for p in shapes:
-        own = slice(end, end := end + len(p.triangle))
+        rows = slice(end, end := end + len(p.triangle))
         if p.frame is not None and p.light is not None:
-            number[own], uv[own] = p.material.normal or 0, p.light[p.triangle]
-            frame[own] = p.frame[p.triangle[:, 0]]  # the corners have the same
+            number[rows], uv[rows] = p.material.normal or 0, p.light[p.triangle]
+            frame[rows] = p.frame[p.triangle[:, 0]]  # the corners have the same
     return MappedRelief(number, uv, frame)
 
 
@@ -241,3 +258,28 @@ def _colors(primitive: ReadPrimitive) -> Floats:
     if primitive.color is None:
         return np.ones((len(primitive.triangle), 3, 3))
     return to_srgb(primitive.color)[primitive.triangle]
+
+
+def bumps_of(shapes: list[ReadPrimitive], count: list[int]) -> Bumps | None:
+    """Those of shapes with ``count`` triangles each, except those that blend, which the page shows
+    without; None if there are none."""
+    drawn = [p.normal is not None and not _blends(p) for p in shapes]
+    if not any(drawn):
+        return None
+    number = [p.material.normal if has else -1 for p, has in zip(shapes, drawn, strict=True)]
+    clamped = [[wrap == WRAPS["clamp"] for wrap in p.material.normal_wrap] for p in shapes]
+    return Bumps(
+        np.repeat(np.array(number, np.int32), count),
+        np.concatenate([corners_of(p.normal, p.triangle) for p in shapes]),
+        np.repeat([float(p.material.scale) for p in shapes], count),
+        np.repeat(np.array(clamped, np.bool_), count, axis=0),
+    )
+
+
+def _blends(shape: ReadPrimitive) -> bool:
+    return shape.material.blends and shape.material.cutoff is None
+
+
+def corners_of(uv: NDArray[np.float32] | None, triangle: Ints) -> Floats:
+    """(m, 3, 2) coordinates of the corners of triangles; 0 without."""
+    return np.zeros((len(triangle), 3, 2)) if uv is None else uv.astype(np.float64)[triangle]

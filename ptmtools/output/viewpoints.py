@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions, storey_name
-from ptmtools.output.standpoints import Ground, largest_leaves, places
+from ptmtools.output.standpoints import FloorFinder, largest_leaves, places
 from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE
@@ -51,9 +51,9 @@ def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[in
         if stop != start and before[stop] < 0:
             continue
         stops_of.setdefault(stop, []).append(i)
-        leaf, far = stop, length[stop]
+        leaf, distance = stop, length[stop]
         while leaf >= 0:
-            reach[leaf] = max(reach.get(leaf, 0.0), far)
+            reach[leaf] = max(reach.get(leaf, 0.0), distance)
             if before[leaf] >= 0:
                 onwards.setdefault(before[leaf], set()).add(leaf)
             leaf = before[leaf]
@@ -91,20 +91,20 @@ def _ways(cells: Cells, start: int, tall: float) -> tuple[list[float], list[int]
         rise = np.maximum.reduceat(up, begin) - np.minimum.reduceat(up, begin)
         way = np.linalg.norm(middle[cells.portal_leaf] - door[:, None], axis=2).sum(axis=1)
         way[(abs(cells.portal_plane[:, 1]) < _LEVEL) & (rise < tall)] *= _CLIMB
-        for (a, b), far in zip(cells.portal_leaf.tolist(), way.tolist(), strict=True):
-            edges[a].append((b, far))
-            edges[b].append((a, far))
+        for (a, b), distance in zip(cells.portal_leaf.tolist(), way.tolist(), strict=True):
+            edges[a].append((b, distance))
+            edges[b].append((a, distance))
     length, before = [np.inf] * cells.leaf_count, [-1] * cells.leaf_count
     length[start] = 0.0
     waiting = [(0.0, start)]
     while waiting:
-        far, leaf = heappop(waiting)
-        if far > length[leaf]:
+        distance, leaf = heappop(waiting)
+        if distance > length[leaf]:
             continue
         for neighbour, way in edges[leaf]:
-            if far + way < length[neighbour]:
-                length[neighbour], before[neighbour] = far + way, leaf
-                heappush(waiting, (far + way, neighbour))
+            if distance + way < length[neighbour]:
+                length[neighbour], before[neighbour] = distance + way, leaf
+                heappush(waiting, (distance + way, neighbour))
     return length, before
 
 
@@ -124,10 +124,10 @@ def place_viewpoints(
 
     Raises InputError: PTM-I111 if a viewpoint that the user gave lies in no cell.
     """
-    ground, outlook = Ground(scene), Outlook(scene, textures)
+    ground, outlook = FloorFinder(scene), Outlook(scene, textures)
     notes: list[str] = []
     if options.viewpoints:
-        initial = _given(cells, ground, outlook, options)
+        initial = _given_viewpoints(cells, ground, outlook, options)
     else:
         initial = _cameras(scene, cells, ground, options, notes)
     if options.viewpoint_count or not initial:
@@ -154,12 +154,12 @@ def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, fl
         v = np.zeros(3)
         v[[i, j, k]] = 1 + 2 * t[i] - t[3], m[j, i] + m[i, j], m[k, i] + m[i, k]
         w = m[k, j] - m[j, k]
-    most = float(abs(v).max())
-    if most == 0:
+    largest = float(abs(v).max())
+    if largest == 0:
         return (0.0, 1.0, 0.0, 0.0)
-    axis = v / most  # so that its square does not underflow
+    axis = v / largest  # so that its square does not underflow
     size = float(np.linalg.norm(axis))
-    axis, angle = axis / size + 0.0, float(2 * np.arctan2(most * size, w))
+    axis, angle = axis / size + 0.0, float(2 * np.arctan2(largest * size, w))
     if angle > np.pi:
         angle -= 2 * np.pi
     x, y, z = axis.tolist()
@@ -186,7 +186,7 @@ def _heading(yaw: float) -> NDArray[np.float64]:
 
 
 def _standing(
-    cells: Cells, ground: Ground, position: NDArray[np.float64], options: WriterOptions
+    cells: Cells, ground: FloorFinder, position: NDArray[np.float64], options: WriterOptions
 ) -> tuple[NDArray[np.float64], int]:
     """A place to stand at a position, and its cell, -1 for none; on the floor below if that is
     within reach."""
@@ -207,7 +207,7 @@ def _cell_to_stand_in(cells: Cells, position: NDArray[np.float64]) -> int:
 
 
 def _cameras(
-    scene: Scene, cells: Cells, ground: Ground, options: WriterOptions, notes: list[str]
+    scene: Scene, cells: Cells, ground: FloorFinder, options: WriterOptions, notes: list[str]
 ) -> list[Viewpoint]:
     placed: list[Viewpoint] = []
     for camera in scene.cameras:
@@ -221,8 +221,8 @@ def _cameras(
     return placed
 
 
-def _given(
-    cells: Cells, ground: Ground, outlook: Outlook, options: WriterOptions
+def _given_viewpoints(
+    cells: Cells, ground: FloorFinder, outlook: Outlook, options: WriterOptions
 ) -> list[Viewpoint]:
     placed = []
     for i, given in enumerate(options.viewpoints):
@@ -250,7 +250,7 @@ def _given(
 def _touring(
     scene: Scene,
     cells: Cells,
-    ground: Ground,
+    ground: FloorFinder,
     outlook: Outlook,
     options: WriterOptions,
     initial: Sequence[Viewpoint],

@@ -1,7 +1,7 @@
 """The best view from a place: the direction with the most visible detail of textures, and of about
 equally good ones the longest.
 
-`Pictures` measures detail with rays in all directions. Each ray resolves as many texels as it has
+`Panoramas` measures detail with rays in all directions. Each ray resolves as many texels as it has
 pixels on a screen of 1080 lines, or fewer where a texel is larger than a pixel; a texture that
 repeats, such as a floor tile, counts at most its own number of texels, at its finest visible scale.
 The worth of a view is the sum over textures of the cube root of the visible texels times the
@@ -69,7 +69,7 @@ def _contrast(texture: TextureRecord) -> float:
     return sum(texture.detail.differences[max(last - 1, 0) : last + 1]) / _WHITE
 
 
-class Pictures:
+class Panoramas:
     """The textures of a scene on its triangles."""
 
     def __init__(self, scene: Scene, textures: Sequence[TextureRecord]) -> None:
@@ -93,7 +93,7 @@ class Pictures:
         box = corners.reshape(-1, 3) if len(corners) else np.zeros((1, 3))
         self._middle = (box.min(axis=0) + box.max(axis=0)) / 2
         self._scale = 1 / scene.tolerance.extent
-        self._local = self._normalised(corners)
+        self._local = self._normalise(corners)
         self._tree: Any = None
 
     def worth(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,25 +107,27 @@ class Pictures:
         way[..., 0], way[..., 2] = -np.sin(turn)[:, None], -np.cos(turn)[:, None]
         way[..., 1] = rise
         ways = np.tile(way.reshape(-1, 3), (len(places), 1))
-        triangle, far = self._cast(np.repeat(places, _COLUMNS * _ROWS, axis=0), ways)
-        near = (far < _NEAR) | (triangle < 0)
+        triangle, distance = self._cast(np.repeat(places, _COLUMNS * _ROWS, axis=0), ways)
+        near = (distance < _NEAR) | (triangle < 0)
         free = _sectors(1 - near.reshape(len(places), _COLUMNS, _ROWS).mean(axis=2))
         free /= 2 * _ACROSS + 1
         ray = np.flatnonzero((triangle >= 0) & (self._detail[self._image[triangle]] > 0))
         hit = triangle[ray]
         image, slant = self._image[hit], abs((self._normal[hit] * ways[ray]).sum(axis=1))
         # Texels and pixels to the square of a radian.
-        texels = self._density[hit] * far[ray] ** 2 / np.maximum(slant, np.finfo(np.float64).eps)
+        texels = (
+            self._density[hit] * distance[ray] ** 2 / np.maximum(slant, np.finfo(np.float64).eps)
+        )
         pixels = np.minimum(texels, _PIXELS**2)
         place, column = np.divmod(ray // _ROWS, _COLUMNS)
         pairs, pair = np.unique(place * len(self._texels) + image, return_inverse=True)
-        each = np.bincount(pair * _COLUMNS + column, pixels, len(pairs) * _COLUMNS)
-        visible = _sectors(_STEP**2 * each.reshape(-1, _COLUMNS))
-        most = np.zeros(len(pairs))
+        pixel_sum = np.bincount(pair * _COLUMNS + column, pixels, len(pairs) * _COLUMNS)
+        visible = _sectors(_STEP**2 * pixel_sum.reshape(-1, _COLUMNS))
+        best = np.zeros(len(pairs))
         share = np.divide(pixels, texels, out=np.zeros_like(texels), where=texels > 0)
-        np.maximum.at(most, pair, share * self._texels[image])
+        np.maximum.at(best, pair, share * self._texels[image])
         place, image = np.divmod(pairs, len(self._texels))
-        value = self._detail[image, None] * np.cbrt(np.minimum(visible, most[:, None]))
+        value = self._detail[image, None] * np.cbrt(np.minimum(visible, best[:, None]))
         np.add.at(worth, place, value)
         return np.where(free >= 0.5, worth * free, 0.0)
 
@@ -136,11 +138,11 @@ class Pictures:
         lengths of ``way``."""
         if self._tree is None:
             self._tree = ray_tree(self._local)
-        hits = self._tree.run(self._normalised(origin), way.astype(np.float32), output=True)
-        far = hits["tfar"].astype(np.float64) / self._scale
-        return hits["primID"].astype(np.int64), far
+        hits = self._tree.run(self._normalise(origin), way.astype(np.float32), output=True)
+        distance = hits["tfar"].astype(np.float64) / self._scale
+        return hits["primID"].astype(np.int64), distance
 
-    def _normalised(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+    def _normalise(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
         local: NDArray[np.float32] = ((points - self._middle) * self._scale).astype(np.float32)
         return local
 
@@ -165,14 +167,14 @@ _X, _Z = -np.sin(_YAW), -np.cos(_YAW)
 
 
 @dataclass(frozen=True)
-class View:
+class BestView:
     """The best view from some places.
 
     Attributes
     ----------
     place: index of the place.
     yaw: radians, counter-clockwise from -Z.
-    worth: see `Pictures.worth`.
+    worth: see `Panoramas.worth`.
     """
 
     place: int
@@ -193,15 +195,15 @@ class Outlook:
         self.walls: Callable[[float], NDArray[np.float64]] = cache(
             partial(triangle_section, scene.corners[scene.opaque])
         )
-        self._pictures = Pictures(scene, textures)
+        self._pictures = Panoramas(scene, textures)
 
-    def best(self, places: NDArray[np.float64], height: float) -> View:
+    def best(self, places: NDArray[np.float64], height: float) -> BestView:
         """The best view from (n, 3) places at heights of about ``height``."""
         worth = self._pictures.worth(places)
         good = worth >= _AS_GOOD * worth.max()
         length = np.where(good, lengths(places[:, [0, 2]], self.walls(height)), -1.0)
         place, way = np.unravel_index(int(length.argmax()), length.shape)
-        return View(int(place), float(_YAW[way]), float(worth[place, way]))
+        return BestView(int(place), float(_YAW[way]), float(worth[place, way]))
 
 
 def lengths(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:

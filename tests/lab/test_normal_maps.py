@@ -11,9 +11,9 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.link import Conditions
-from ptmtools.output.bumps import bumps_of
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.served import Served, read_served
+from ptmtools.output.surfaces import bumps_of
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.light import AMBIENT, LAMP, lit

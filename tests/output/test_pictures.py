@@ -12,7 +12,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.output import EmitOptions, GivenViewpoint, TextureRecord
 from ptmtools.output.model import Viewpoint
 from ptmtools.output.viewpoints import place_viewpoints
-from ptmtools.output.views import DIRECTIONS, Pictures
+from ptmtools.output.views import DIRECTIONS, Panoramas
 from ptmtools.scene.model import Material, Scene, SourceImage
 from ptmtools.texture.detail import Detail
 from ptmtools.texture.model import Level
@@ -122,10 +122,10 @@ def test_plaster_is_no_picture(corridor: tuple[Scene, Cells]) -> None:
     scene, _ = corridor
     scene = hung(scene, (2, across(4.6, 1.0)), (3, across(1.0, 1.0)))
     middle = np.array([[2.3, 1.6, 0.0]])
-    worth = Pictures(scene, (PAINTING, PLASTER)).worth(middle)[0]
+    worth = Panoramas(scene, (PAINTING, PLASTER)).worth(middle)[0]
     left, right = worth[DIRECTIONS // 4], worth[3 * DIRECTIONS // 4]
     assert left > 2 * right > 0
-    alike = Pictures(scene, (PAINTING, replace(PLASTER, detail=detail(0.1)))).worth(middle)[0]
+    alike = Panoramas(scene, (PAINTING, replace(PLASTER, detail=detail(0.1)))).worth(middle)[0]
     assert alike[3 * DIRECTIONS // 4] == pytest.approx(20 * right)
 
 
@@ -136,7 +136,7 @@ def test_no_more_texels_than_there_are(corridor: tuple[Scene, Cells]) -> None:
     for side, repeats in ((4, 1), (8, 40)):
         walled = hung(scene, (2, across(4.0, 1.5)))
         walled = replace(walled, uv=walled.uv * repeats)
-        worth = Pictures(walled, (record(1, side, 0.1),)).worth(np.array([[1.8, 1.6, 0.0]]))
+        worth = Panoramas(walled, (record(1, side, 0.1),)).worth(np.array([[1.8, 1.6, 0.0]]))
         assert worth[0, 3 * DIRECTIONS // 4] == pytest.approx(0.1 * np.cbrt(side**2), rel=0.3)
         assert worth.max() <= 0.1 * np.cbrt(side**2) * (1 + 1e-9)
 
@@ -144,7 +144,7 @@ def test_no_more_texels_than_there_are(corridor: tuple[Scene, Cells]) -> None:
 def test_nose_to_the_wall(corridor: tuple[Scene, Cells]) -> None:
     scene, _ = corridor
     places = np.array([[1.0, 1.6, 0.0], [2.5, 1.6, 0.0]])
-    near, far = Pictures(scene, (PAINTING,)).worth(places)[:, DIRECTIONS // 4]
+    near, far = Panoramas(scene, (PAINTING,)).worth(places)[:, DIRECTIONS // 4]
     assert near == 0 < far
 
 
@@ -153,7 +153,7 @@ def test_far_from_the_origin(corridor: tuple[Scene, Cells], scale: float) -> Non
     """Texels do not depend on where a model is; how near a wall is, is a matter of metres."""
     scene, _ = corridor
     place = np.array([[2.5, 1.6, 0.0]])
-    here = Pictures(scene, (PAINTING,)).worth(place)
+    here = Panoramas(scene, (PAINTING,)).worth(place)
     off = np.array([scale * 100, 0, 0])
-    there = Pictures(replace(scene, points=scene.points + off), (PAINTING,)).worth(place + off)
+    there = Panoramas(replace(scene, points=scene.points + off), (PAINTING,)).worth(place + off)
     np.testing.assert_allclose(there, here, rtol=1e-2, atol=1e-3 * here.max())

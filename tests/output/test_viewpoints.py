@@ -11,7 +11,7 @@ from hypothesis import example, given, strategies as st
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output import EmitOptions, GivenViewpoint
-from ptmtools.output.standpoints import Ground
+from ptmtools.output.standpoints import FloorFinder
 from ptmtools.output.storeys import area, leaf_section, polygon_section, storeys, triangle_section
 from ptmtools.output.viewpoints import orientation, place_viewpoints, storey_numbers, walk
 from ptmtools.output.views import lengths
@@ -233,9 +233,9 @@ def test_the_floor_below(room_row, seed: int) -> None:
             if (abs(slope) if both else slope) > np.cos(np.pi / 4) and inside and height <= p[1]:
                 heights.append(height)
         wanted.append(max(heights))
-    np.testing.assert_allclose(Ground(scene).below(points), wanted, atol=1e-9)
+    np.testing.assert_allclose(FloorFinder(scene).below(points), wanted, atol=1e-9)
     assert np.isfinite(wanted).sum() > 5
-    assert Ground(scene).below(points[:0]).shape == (0,)
+    assert FloorFinder(scene).below(points[:0]).shape == (0,)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ptmtools.output import EmitOptions, TextureRecord, emit
-from ptmtools.output.model import Visit
+from ptmtools.output.model import VisitCost
 from ptmtools.visibility.model import Pvs, over_places
 
 #: The second room is twice as large as it looks, the third half as large.
@@ -34,7 +34,7 @@ def seen(artifacts: Any, made_up_hints: Callable[[Pvs, np.ndarray], Any]) -> Any
 
 def written(
     a: Any, www: Path, records: tuple[TextureRecord, ...], options: EmitOptions
-) -> tuple[Visit, set[str]]:
+) -> tuple[VisitCost, set[str]]:
     report = emit(a.scene, a.cells, a.pvs, a.ach, records, www, options)
     return report.visit, set(report.files)
 

@@ -71,7 +71,7 @@ def validate_database(
         raise DatabaseError(
             "PTM-D001", "no such folder", file=folder, remedy="use a database or a .ptm file"
         )
-    check = _Check(folder, limits)
+    check = _DatabaseCheck(folder, limits)
     # Damaged files may hold any number; overflows only make comparisons fail.
     with np.errstate(all="ignore"):
         check.run(progress, workers or os.cpu_count() or 1)
@@ -118,7 +118,7 @@ class _Reading:
     content: object | None = None
 
 
-class _Check:
+class _DatabaseCheck:
     """One validation of one database."""
 
     def __init__(self, folder: Path, limits: Limits) -> None:
@@ -150,7 +150,7 @@ class _Check:
             return
         listed = {path for path in ours if f"{SERVED}/{path}" in self._outputs} or ours
         present = [e for e in all_emitters() if any(map(e.is_owner, listed))]
-        for emitter in {*present, *self._chosen(present)}:
+        for emitter in {*present, *self._emitters_to_expect(present)}:
             for name in emitter.owns:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):
                     database.at(name).add("PTM-D651", "missing")
@@ -178,7 +178,7 @@ class _Check:
             self._manifest.add("PTM-D650", fault.message, fault.place)
         for record in self._stages.values():
             for field in ("inputs", "outputs"):
-                record[field] = self._listed(record[field], field == "outputs")
+                record[field] = self._listed_files(record[field], field == "outputs")
         for stage, record in self._stages.items():
             at = self._manifest.at(f"stages.{stage}")
             for name in sorted(self._outputs.keys() & record["outputs"].keys()):
@@ -192,7 +192,7 @@ class _Check:
                 elif stage == _EMIT and name not in self._outputs and name.split("/")[0] in WRITTEN:
                     at.add("PTM-D656", f"computed from {name}, which no stage has written")
 
-    def _listed(self, files: dict[str, str] | list[str], outputs: bool) -> dict[str, str]:
+    def _listed_files(self, files: dict[str, str] | list[str], outputs: bool) -> dict[str, str]:
         """Inputs or outputs of a stage, of the manifest or of lists."""
         if isinstance(files, dict):
             return files
@@ -201,10 +201,10 @@ class _Check:
         for digest in files:
             fault = ""
             try:
-                own = lists_in(self._folder)(digest)
-                if outputs and not all_outputs(own):
-                    own, fault = {}, "is no list of outputs"
-                listed |= own
+                content = lists_in(self._folder)(digest)
+                if outputs and not all_outputs(content):
+                    content, fault = {}, "is no list of outputs"
+                listed |= content
             except DatabaseError as error:  # a file that is missing or another is reported as such
                 self._complete = False
                 fault = error.message if error.code == "PTM-D006" else ""
@@ -228,7 +228,7 @@ class _Check:
             subject = f"{count(len(paths), 'file')} in {SERVED}/ {are} not from ptmtools"
             self.notes = (f"{subject} and {were} not checked: {listed}",)
 
-    def _chosen(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
+    def _emitters_to_expect(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
         """The emitters that the manifest names; if it names none, those present or the default."""
         try:
             return chosen_emitters(str(self._stages[_EMIT]["parameters"]["format"]))

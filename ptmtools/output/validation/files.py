@@ -84,10 +84,10 @@ def check_names(files: Iterable[str], findings: Findings) -> None:
         parts = file.split("/")
         for depth in range(1, len(parts) + 1):
             path = "/".join(parts[:depth])
-            other = known.setdefault(path.casefold(), path)
-            if other != path:
+            similar = known.setdefault(path.casefold(), path)
+            if similar != path:
                 known[path.casefold()] = path
-                findings.at(f"{SERVED}/{path}").add("PTM-D675", f"there is {other} too")
+                findings.at(f"{SERVED}/{path}").add("PTM-D675", f"there is {similar} too")
 
 
 def check_gzip(copy: bytes, original: bytes | None, at: Place) -> None:
@@ -190,7 +190,7 @@ class ServedDatabase:
         none."""
         key = (posixpath.dirname(path), url)
         if key not in self._known:
-            self._known[key] = self._resolved(*key)
+            self._known[key] = self._find_file(*key)
         file, fault = self._known[key]
         if fault:
             self.at(path, url).add("PTM-D671", fault)
@@ -206,7 +206,7 @@ class ServedDatabase:
                 self.at(path, place).add("PTM-D671", f"{file} is named {count} times")
         return files
 
-    def _resolved(self, base: str, url: str) -> tuple[str, str]:
+    def _find_file(self, base: str, url: str) -> tuple[str, str]:
         """(path, "") or ("", fault)."""
         if _ABSOLUTE.match(url):
             return "", "is no relative URL"
@@ -221,6 +221,6 @@ class ServedDatabase:
             return "", "points outside the served folder"
         if path in self.files:
             return path, ""
-        other = self._folded.get(path.casefold())
-        message = f"no such file, but there is {other}" if other else "no such file"
+        similar = self._folded.get(path.casefold())
+        message = f"no such file, but there is {similar}" if similar else "no such file"
         return "", message

@@ -93,7 +93,7 @@ def check_record(
     if (record["fallback"] is None) != (record["fallbackLevel"] is None):
         at.add("PTM-D704", "only one of fallback and fallbackLevel is null")
     elif fallback is not None and fallback.size not in sizes:
-        message = f"is {_shown(fallback.size)}, which is not the size of any level"
+        message = f"is {_size_text(fallback.size)}, which is not the size of any level"
         at.add("PTM-D710", f"{record['fallback']} {message}")
     elif fallback is not None and (level := sizes.index(fallback.size)) != record["fallbackLevel"]:
         message = f"the fallback image is level {level}, not {record['fallbackLevel']}"
@@ -117,12 +117,12 @@ def _check_previews(
         if row["level"] >= len(sizes):
             at.add("PTM-D704", f"the {place} has no level")
         elif size != sizes[row["level"]]:
-            at.add("PTM-D704", f"the {place} is {_shown(size)}, its level is not")
+            at.add("PTM-D704", f"the {place} is {_size_text(size)}, its level is not")
         if row.get("exact") and row["difference"]:
             at.add("PTM-D704", f"the {place} is exact and differs by {row['difference']:g}")
         if picture and picture != (size, row["bytes"]):
             at.add("PTM-D704", f"the {place} does not match its file")
 
 
-def _shown(size: tuple[int, int]) -> str:
+def _size_text(size: tuple[int, int]) -> str:
     return f"{size[0]} x {size[1]}"
