@@ -49,7 +49,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/coverage": (2_510, 15),
     "ptmtools/light": (2_070, 11),
     "ptmtools/meshopt": (830, 5),
-    "ptmtools/output": (7_780, 40),
+    "ptmtools/output": (7_760, 39),
     "ptmtools/pipeline": (3_680, 18),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (1_750, 13),
