@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ptmtools.cli.interrupts import is_interrupt
 from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.progress import Progress, silent
 
@@ -204,6 +205,8 @@ def describe(fault: BaseException) -> tuple[int, str]:
             )
         case SystemExit():
             return fault.code if isinstance(fault.code, int) else INTERNAL, ""
+    if is_interrupt(fault):
+        return describe(KeyboardInterrupt())
     message = " ".join(str(fault).split())
     return INTERNAL, (
         f"internal error, {type(fault).__name__}: {message}; please report it, "

@@ -18,6 +18,7 @@ from click.shell_completion import CompletionItem
 from ptmtools import plugins
 from ptmtools.cli.console import BROKEN_PIPE, Console, abandon_stdout, report
 from ptmtools.cli.entry import Entry
+from ptmtools.cli.interrupts import LostInterrupts, is_interrupt
 from ptmtools.progress import listen
 from ptmtools.version import __version__
 
@@ -153,11 +154,15 @@ def main(arguments: Sequence[str]) -> int:
     """Runs one command; returns its exit status. Never raises."""
     console = Console()
     warnings.filterwarnings("ignore", module=r"PIL\.")  # serious ones become errors of ptmtools
+    interrupts = LostInterrupts()
     try:
-        status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=console)
+        with interrupts:
+            status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=console)
         sys.stdout.flush()
         return status if isinstance(status, int) else 0
     except BaseException as fault:
+        if interrupts.any and not is_interrupt(fault):
+            fault.__cause__ = KeyboardInterrupt()
         status = report(fault, console.verbose)
         try:
             sys.stdout.flush()
