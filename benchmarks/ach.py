@@ -44,7 +44,7 @@ from ptmtools.coverage.backends import BACKENDS
 from ptmtools.coverage.backends.opengl import OpenGLRenderer, create_context, is_software
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import PRESETS, AchOptions
-from ptmtools.coverage.sampling import CellHints, Sampler
+from ptmtools.coverage.sampling import CellHints, HintSampler
 from ptmtools.errors import MissingComponentError
 from ptmtools.parallel import open_executor
 from ptmtools.scene import ingest
@@ -255,7 +255,7 @@ def speed(report: Report, subjects: dict[str, Subject]) -> None:
             for backend in ("embree", "gl") if has_gl() else ("embree",):
                 points = min(count, 32) if backend == "gl" else count
                 options = AchOptions(backend=backend, samples=points, face=face)
-                sampler = Sampler(scene, cells, pvs, options, BACKENDS[backend])
+                sampler = HintSampler(scene, cells, pvs, options, BACKENDS[backend])
                 sampler.of_cell(largest[0])
                 watch = watched(sampler.renderer)
                 start = time.perf_counter()

@@ -38,12 +38,13 @@ from scenes import model_file
 from ptmtools.arrays import Bools, Floats, areas
 from ptmtools.cells.model import Cells
 from ptmtools.light.atlas import unwrap
-from ptmtools.light.cells import ABOVE, COVERED, WHITE, Baking, Piece, encoded, exposed
+from ptmtools.light.cells import ABOVE, COVERED, WHITE, LightBaking, encode, expose
 from ptmtools.light.lamps import lamps_of
 from ptmtools.light.lightmap import bake
-from ptmtools.light.looks import LightImage, Painted, Rays, lookup
-from ptmtools.light.mixing import Mix, mixed
-from ptmtools.light.occlusion import Surroundings, light, normals, points_on, spread_over, turns
+from ptmtools.light.looks import LightImage, PaintedLight, RayLight, lookup
+from ptmtools.light.mixing import LightMix, light_mix
+from ptmtools.light.model import CellSurfaces
+from ptmtools.light.occlusion import Occluders, light, normals, points_on, spread_over, turns
 from ptmtools.light.options import LightOptions
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf import pack
@@ -128,14 +129,14 @@ def accuracy(model: Path) -> None:
     scene, cells = cut(model)
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
     pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
-    around = Surroundings.of(scene)
+    around = Occluders.from_scene(scene)
     print(f"| {model.stem}: texels per metre | rays | s, one processor | texels | error |")
     print("|--:|--:|--:|--:|--:|")
     for density in DENSITIES:
         for samples in SAMPLES:
             options = LightOptions("bake", density, samples)
             began, texels, square, count = process_time(), 0, 0.0, 0
-            results = [Baking(around, options).light(piece) for piece in pieces]
+            results = [LightBaking(around, options).light(piece) for piece in pieces]
             seconds = process_time() - began
             for piece, result in zip(pieces, results, strict=True):
                 if result.texels is None:
@@ -166,11 +167,11 @@ def parts(model: Path) -> None:
     print("|---|--:|--:|--:|--:|--:|")
     least = 0.0
     for name, of, glowing in (("ambient", scene, None), ("+ sky", scene, None), ("+ lamps", *lit)):
-        around, began = Surroundings.of(of), process_time()
-        mix = Mix()
+        around, began = Occluders.from_scene(of), process_time()
+        mix = LightMix()
         if name != "ambient":
-            mix = mixed(around, pieces, lamps_of(of, glowing), options, ABOVE, WHITE)
-        results = [Baking(around, options, mix).light(piece) for piece in pieces]
+            mix = light_mix(around, pieces, lamps_of(of, glowing), options, ABOVE, WHITE)
+        results = [LightBaking(around, options, mix).light(piece) for piece in pieces]
         seconds = process_time() - began
         least = least or seconds
         size = sum(ptm_bytes(r.texels) for r in results if r.texels is not None)
@@ -193,7 +194,7 @@ def with_panels(scene: Scene, cells: Cells) -> tuple[Scene, Lights]:
         corner = np.concatenate(rows)
         middle.append((corner.min(axis=0) + corner.max(axis=0)) / 2)
     place = np.array(middle)
-    place[:, 1] = Surroundings.of(scene).upright(place, 20.0, 1.0) - 0.02
+    place[:, 1] = Occluders.from_scene(scene).upright(place, 20.0, 1.0) - 0.02
     panel = 0.3 * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
     points = (place[:, None] + panel).reshape(-1, 3)
     first = len(scene.points) + 4 * np.arange(len(place))[:, None, None]
@@ -219,8 +220,10 @@ def of_the_model(model: Path) -> None:
     scene = ingest(model)
     corner, area = scene.corners, areas(scene.corners)
     atlas = unwrap(scene.points, scene.triangles, (SIDE,), padding=1, purpose="the benchmark")
-    look = Rays(Surroundings.of(scene), corner, LightOptions().light_samples, 3.0, above=ABOVE)
-    texels = encoded(bake(look, corner, atlas, look.grain, (SIDE,))[0].value)
+    look = RayLight(
+        Occluders.from_scene(scene), corner, LightOptions().light_samples, 3.0, above=ABOVE
+    )
+    texels = encode(bake(look, corner, atlas, look.grain, (SIDE,))[0].value)
     image = png_bytes(texels[:, :, None])
     with tempfile.TemporaryDirectory() as folder:
         lit = Path(folder, "lit.glb")
@@ -250,7 +253,7 @@ def of_the_model(model: Path) -> None:
                       points_on(flat[0][face].astype(np.float64), number)[:, :2])  # fmt: skip
         point = points_on(piece.corner[own][face].astype(np.float64), number)
         source = piece.face[own][face]
-        there = Painted(scene.corners, atlas.uv, np.zeros(len(area), np.int32), (painted,),
+        there = PaintedLight(scene.corners, atlas.uv, np.zeros(len(area), np.int32), (painted,),
                         np.arange(len(area)))(source, point, turns(POINTS))  # fmt: skip
         square, count = square + float(((seen - there) ** 2).sum()), count + POINTS
     error = 255 * np.sqrt(square / max(count, 1))
@@ -266,8 +269,8 @@ def at_vertices(model: Path) -> None:
     scene, cells = cut(model)
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials])
     pieces = pieces_of(Geometry(scene, cells), cells, glass, 1 / LightOptions().light_density)
-    around, options = Surroundings.of(scene), LightOptions("bake")
-    mix = mixed(around, pieces, lamps_of(scene, None), options, ABOVE, WHITE)
+    around, options = Occluders.from_scene(scene), LightOptions("bake")
+    mix = light_mix(around, pieces, lamps_of(scene, None), options, ABOVE, WHITE)
     objects = [part(piece, piece.dense & ~piece.glass) for piece in pieces]
     objects = [piece for piece in objects if len(piece.corner)]
     print("| model | triangles | rays from a texel | s, one processor | error |")
@@ -275,7 +278,7 @@ def at_vertices(model: Path) -> None:
     if not objects:
         print(f"| {model.stem} | 0 | – | – | – |", flush=True)
         return
-    exact = Baking(around, replace(options, light_samples=REFERENCE), mix)
+    exact = LightBaking(around, replace(options, light_samples=REFERENCE), mix)
     count = np.array([len(piece.corner) for piece in objects])
     area = areas(np.concatenate([piece.corner for piece in objects]).astype(np.float64))
     face = spread_over(area, np.zeros(len(area), np.int64), np.array([0]), ON_OBJECTS)[0]
@@ -288,9 +291,12 @@ def at_vertices(model: Path) -> None:
         corner = piece.corner.astype(np.float64)
         look = exact.look(corner, exact.sides(corner, piece.side), piece.face)
         point = np.einsum("nk,nkx->nx", share, corner[own])
-        places.append((own, share, exposed(look(own, point, turns(len(own))))))
+        places.append((own, share, expose(look(own, point, turns(len(own))))))
     for samples in (2 * options.light_samples, options.light_samples):
-        baking, began = Baking(around, replace(options, light_samples=samples), mix), process_time()
+        baking, began = (
+            LightBaking(around, replace(options, light_samples=samples), mix),
+            process_time(),
+        )
         results = [baking.light(piece) for piece in objects]
         seconds, square = process_time() - began, 0.0
         for result, (own, share, truth) in zip(results, places, strict=True):
@@ -301,9 +307,9 @@ def at_vertices(model: Path) -> None:
               flush=True)  # fmt: skip
 
 
-def part(piece: Piece, chosen: Bools) -> Piece:
+def part(piece: CellSurfaces, chosen: Bools) -> CellSurfaces:
     """The chosen surfaces of a piece."""
-    return Piece(*(getattr(piece, field.name)[chosen] for field in fields(Piece)))
+    return CellSurfaces(*(getattr(piece, field.name)[chosen] for field in fields(CellSurfaces)))
 
 
 def lit_glb(corner: Floats, uv: Floats, image: bytes) -> bytes:
@@ -334,7 +340,7 @@ def lit_glb(corner: Floats, uv: Floats, image: bytes) -> bytes:
     return pack(document, b"".join(data))
 
 
-def errors(around: Surroundings, corner: Floats, result: Any, options: LightOptions) -> Floats:
+def errors(around: Occluders, corner: Floats, result: Any, options: LightOptions) -> Floats:
     """(n,) differences of the lightmap of a cell from the reference, of points that are not
     covered."""
     area = areas(corner)
@@ -356,7 +362,7 @@ def errors(around: Surroundings, corner: Floats, result: Any, options: LightOpti
     at = np.einsum("nk,nkx->nx", share, result.uv[face].astype(np.float64))
     seen = lookup(LightImage(result.texels, ("clamp", "clamp")), at)
     # The side that was baked is the nearer one.
-    off = np.abs(exposed(np.stack(both)) - seen)
+    off = np.abs(expose(np.stack(both)) - seen)
     fair = np.max(both, axis=0) > COVERED
     return np.asarray(off.min(axis=0)[fair])
 

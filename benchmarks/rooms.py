@@ -34,12 +34,12 @@ from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.rooms import grouped, leaf_of_cell
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.backends.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import Surfaces
+from ptmtools.coverage.item_buffer import ItemSurfaces
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.coverage.sampling import CLEARANCE
-from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.solids import SampleObstacles
 from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
@@ -57,7 +57,10 @@ PLACES, FACE = 300, 64
 def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.int64]]]:
     """For random places, uniform over where eyes can be, the leaf and (L,) the pixels that each
     leaf covers, seen from there."""
-    obstacles, surfaces = Obstacles.of(scene, leaves), Surfaces.of(scene, leaves)
+    obstacles, surfaces = (
+        SampleObstacles.from_scene(scene, leaves),
+        ItemSurfaces.from_scene(scene, leaves),
+    )
     clearance = CLEARANCE * scene.tolerance.thin
     random = np.random.default_rng(seed)
     low, high = leaves.root_box

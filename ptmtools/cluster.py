@@ -111,7 +111,7 @@ class Cluster(Executor):
         sent: deque[list[Any]] = deque()  # chunks whose results have not come
         value: Any = None
 
-        def taken() -> Iterator[list[Any]]:
+        def unsent_chunks() -> Iterator[list[Any]]:
             for some in rest:
                 sent.append(some)
                 yield some
@@ -124,8 +124,8 @@ class Cluster(Executor):
                 return asyncio.run_coroutine_threadsafe(_fetch(remote), loop)
 
         loop = self._client.loop.asyncio_loop
-        for left in range(AGAIN, -1, -1):
-            todo = chain(tuple(sent), taken())
+        for attempts in range(AGAIN, -1, -1):
+            todo = chain(tuple(sent), unsent_chunks())
             try:
                 value = self._scatter(shared)
                 for done in in_order(submit, todo, self._ahead, result=self._result):
@@ -136,7 +136,7 @@ class Cluster(Executor):
                 # A worker ended, with what had the value, or while it was to get it.
                 lost = isinstance(fault.__cause__, (CancelledError, OSError))
                 lost &= fault.code == "PTM-W004"
-                if not (left and lost and self._client.status == "running"):
+                if not (attempts and lost and self._client.status == "running"):
                     raise
                 self._wait_for_workers()
             finally:

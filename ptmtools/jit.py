@@ -135,18 +135,18 @@ class _Cache(numba.core.caching.NullCache):
         self._function = function
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        return self._of(sig).load_overload(sig, target_context)
+        return self._cache(sig).load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         # Not the cache that was asked before: a module may have been imported again meanwhile.
-        self._of(sig).save_overload(sig, cres)
+        self._cache(sig).save_overload(sig, cres)
 
-    def _of(self, types: tuple[Any, ...]) -> Any:
+    def _cache(self, types: tuple[Any, ...]) -> Any:
         caching: Any = numba.core.caching
         settings: Any = numba.config
-        classes = (module_file(each.__module__) for each in _classes(types))
-        own = Path(self._function.__code__.co_filename)
-        folder = cache_folder(own, *(file for file in classes if file))
+        sources = (module_file(kind.__module__) for kind in _classes(types))
+        module = Path(self._function.__code__.co_filename)
+        folder = cache_folder(module, *(source for source in sources if source))
         before = settings.CACHE_DIR
         settings.CACHE_DIR = folder
         try:
@@ -164,10 +164,10 @@ def _classes(types: Iterable[Any]) -> Iterator[type]:
     """The classes of named tuples in a signature, whose fields machine code knows by number. It is
     kept beside their names, which fail if a class has moved."""
     tuples: Any = numba.types.BaseTuple
-    for each in types:
-        if isinstance(each, tuples):
-            yield getattr(each, "instance_class", tuple)
-            yield from _classes(each)
+    for kind in types:
+        if isinstance(kind, tuples):
+            yield getattr(kind, "instance_class", tuple)
+            yield from _classes(kind)
 
 
 class _Compilation(numba.core.event.Listener):
@@ -242,4 +242,4 @@ def _imports(text: bytes) -> frozenset[Path]:
         # A name may be a module of a package, or defined in a module.
         for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)) or [""]:
             modules.add(module_file(f"{module}.{name}") or module_file(module or whole))
-    return frozenset(one for one in modules if one)
+    return frozenset(file for file in modules if file)

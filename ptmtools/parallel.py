@@ -158,7 +158,7 @@ class Local(Executor):
             self._idle.put(process)
 
 
-def ordered(function: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterator[R]:
+def map_in_order(function: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterator[R]:
     """``function`` of each task, in order, by threads of its own; at most ``threads`` + 1 tasks are
     begun and not yielded. With one thread, a task begins when its result is asked for."""
     if threads <= 1:
@@ -274,7 +274,7 @@ class Process:
         for _ in range(_ATTEMPTS):
             watch = None
             try:
-                process, pipe = self._started()
+                process, pipe = self._start()
                 with watch_child(process.pid or 0, process.kill, IDLE) as watch:
                     pipe.send((function, arguments))
                     answer: Outcome = pipe.recv()
@@ -301,7 +301,7 @@ class Process:
         self._closed = True
         self._end()
 
-    def _started(self) -> tuple[BaseProcess, Connection]:
+    def _start(self) -> tuple[BaseProcess, Connection]:
         from multiprocessing import get_context, resource_tracker
 
         with self._changing:

@@ -20,7 +20,7 @@ PACKAGE = Path(__file__).parent
 _imported: dict[Path, bytes | None] = {}
 
 
-class _Reader(MetaPathFinder):
+class _SourceReader(MetaPathFinder):
     def find_spec(self, name: str, path: Any, target: Any = None) -> None:
         file = module_file(name) if name.startswith(PACKAGE.name) else None
         if file:
@@ -33,8 +33,8 @@ class _Reader(MetaPathFinder):
 
 def watch() -> None:
     """Reads the sources of all modules of the package that are imported from now on."""
-    if not any(isinstance(finder, _Reader) for finder in sys.meta_path):
-        sys.meta_path.insert(0, _Reader())
+    if not any(isinstance(finder, _SourceReader) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _SourceReader())
 
 
 def source(file: Path) -> bytes | None:

@@ -63,6 +63,11 @@ TIE_SHARE = 3e-7
 #: Of two surfaces in one pixel, depths that differ by less than this share are the same depth:
 #: 0.3 mm at 20 m, above the rounding of float32 depth and below a picture 1 mm off its wall.
 DEPTH_SHARE = 2.0**-16
+#: A ray that goes on behind a surface begins this share of the size of the scene, 1 m at least,
+#: farther on: well above the rounding of float32 (6e-8).
+RAY_STEP_SHARE = 1e-6
+#: Rays with a smaller cosine to the normal of a plane count as having this one.
+GRAZING_COSINE = 1e-9
 #: Points examined beside an edge of a face lie this share of the way towards its middle: 5 mm in a
 #: wall of 10 m, above the rounding of float32 in a face of a centimetre.
 INWARD_SHARE = 1e-3

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress
-from ptmtools.rendering.pyramids import mip_levels, mip_sizes, packed, rgb
+from ptmtools.rendering.pyramids import mip_levels, mip_sizes, pack_pyramids, rgb
 from ptmtools.rendering.records import Pyramids, Shows
 from ptmtools.texture.model import Limits, gpu_texel_bytes
 from ptmtools_lab.catalogue import Columns, aligned, columns_of
@@ -108,7 +108,7 @@ def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
         steps.append(len(joined))
     first = np.cumsum([0, *steps[:-1]]) if steps else np.zeros(0, np.int64)
     each = np.array(steps, dtype=np.int64)
-    pyramids = packed(chains)
+    pyramids = pack_pyramids(chains)
     wide = int(each.max(initial=0)) + 1
     row = first[:, None] + np.clip(np.arange(wide) - 1, 0, each[:, None] - 1)
     held = np.where(np.arange(wide) > 0, pyramids.levels[row], 0)

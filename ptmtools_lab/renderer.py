@@ -14,7 +14,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.lossy import pictures
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Shows, Sight, own_levels, triangles_of
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Renderer:
         self._world, self._full = world, own_levels(world.pyramids)
         self._shows = pictures(world.pyramids, world.lossy) if world.shows is None else world.shows
         camera = world.camera
-        self._camera = Camera(
+        self._camera = RayCamera(
             self.width * samples,
             height * samples,
             camera.field_of_view,

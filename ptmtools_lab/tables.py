@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.lossy import Lossy, no_previews
-from ptmtools.rendering.rays import Camera, Caster
-from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles, triangles_of
+from ptmtools.rendering.lossy import no_previews
+from ptmtools.rendering.rays import Caster, RayCamera
+from ptmtools.rendering.records import Lossy, Pyramids, Shows, Sight, Triangles, triangles_of
 from ptmtools.site.client import NORMALS
 from ptmtools_lab.relief.tables import Relief, Tally as ReliefTally
 from ptmtools_lab.rows import Rows, RowSums
@@ -79,7 +79,7 @@ class Views:
 def look(
     surfaces: Surfaces,
     pyramids: Pyramids,
-    camera: Camera,
+    camera: RayCamera,
     eye: Floats,
     direction: Floats,
     progress: Progress = silent,

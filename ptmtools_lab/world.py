@@ -16,10 +16,10 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.lossy import Lossy, read_lossy
+from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
-from ptmtools.rendering.rays import Camera, Frustum
-from ptmtools.rendering.records import Pyramids, Shows
+from ptmtools.rendering.rays import Frustum, RayCamera
+from ptmtools.rendering.records import Lossy, Pyramids, Shows
 from ptmtools.walk import Browser
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
 from ptmtools_lab.forms import FORMS, PTM
@@ -79,7 +79,7 @@ class World:
     catalogue: Catalogue
     views: Views
     view: Ints
-    camera: Camera
+    camera: RayCamera
     time: Floats
     eye: Floats
     direction: Floats
@@ -214,7 +214,7 @@ def prepare(
     lossy = read_lossy(served, progress) if lossy is None else lossy
     if full is None and relief and relief.reference:
         full = relief.reference.pyramids
-    camera = Camera(*pixels, walk.field_of_view, walk.aspect)
+    camera = RayCamera(*pixels, walk.field_of_view, walk.aspect)
     pose, drawn = np.concatenate([eye, direction], axis=1), None
     if browser:
         camera, drawn = _camera(walk, browser), _drawn(time, browser.age)
@@ -355,11 +355,11 @@ def _require_fitting(browser: Browser, served: Served) -> None:
         )
 
 
-def _camera(walk: Walk, browser: Browser) -> Camera:
+def _camera(walk: Walk, browser: Browser) -> RayCamera:
     """A camera with twice as many pixels each way as the viewer's item buffer."""
     tall = max(1, round(np.sqrt(_ITEM_PIXELS / walk.aspect)))
     wide = max(1, round(_ITEM_PIXELS / tall))
-    return Camera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)
+    return RayCamera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)
 
 
 def _drawn(time: Floats, age: Floats) -> Ints:

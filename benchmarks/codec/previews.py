@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from images import ROOT, image_files, sets
 
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.texture import build_pyramid, encode, load_image, previews as settings, read_header
 from ptmtools.texture.previews import PreviewOptions, Pyramid
 
@@ -75,7 +75,7 @@ def measured(file: Path) -> dict[tuple[int, str], Row]:
 def table(name: str, files: Iterable[Path]) -> None:
     """Prints the tables of a set."""
     total: dict[tuple[int, str], list[float]] = defaultdict(lambda: [0, 0.0, 0])
-    for rows in ordered(measured, list(files), 2):
+    for rows in map_in_order(measured, list(files), 2):
         for key, row in rows.items():
             total[key] = [a + b for a, b in zip(total[key], row, strict=True)]
     columns = ["exact", *(f"{form} {quality}" for form, quality in QUALITIES)]

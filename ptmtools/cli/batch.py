@@ -315,7 +315,7 @@ class Batch:
         """Runs ``work(job, threads)`` for every job, several at a time; a single job has all the
         threads, each of several has one. The other jobs continue after a failure. See `report`.
         """
-        from ptmtools.parallel import ordered
+        from ptmtools.parallel import map_in_order
 
         workers = self.workers or os.cpu_count() or 1
         self.console.to_stderr = any(job.to_stdout for job in jobs)
@@ -329,7 +329,7 @@ class Batch:
             except Exception as fault:
                 return fault
 
-        return self.report(ordered(guarded, jobs, at_once), len(jobs), lines)
+        return self.report(map_in_order(guarded, jobs, at_once), len(jobs), lines)
 
     def report(
         self,

@@ -17,7 +17,7 @@ from ptmtools.coverage.backends import AUTO, BACKENDS, Backend
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.sampling import RULE_OF_THREE, CellHints, Sampler, estimate
+from ptmtools.coverage.sampling import RULE_OF_THREE, CellHints, HintSampler, estimate
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.executor import Executor
 from ptmtools.progress import Progress, silent
@@ -49,9 +49,9 @@ def triangles_of_a_pvs(cells: Cells, pvs: Pvs) -> float:
     if not cells.cell_count:
         return 0.0
     front, back = cells.triangle_cell.T
-    each = np.bincount(front[front >= 0], minlength=cells.cell_count)
-    each += np.bincount(back[(back >= 0) & (back != front)], minlength=cells.cell_count)
-    return float(each[pvs.cell].sum()) / cells.cell_count
+    faces = np.bincount(front[front >= 0], minlength=cells.cell_count)
+    faces += np.bincount(back[(back >= 0) & (back != front)], minlength=cells.cell_count)
+    return float(faces[pvs.cell].sum()) / cells.cell_count
 
 
 #: Rays that justify another process: it takes a second or two to start, as 5 million rays do.
@@ -88,19 +88,19 @@ def compute_ach(
     doer = executor if backend.in_processes and executor.workers > 1 and worth else Executor()
     chunk = int(max(1, min(TASK // rays, count // (4 * doer.workers))))
     rows: list[CellHints] = []
-    sampler = Sampler(scene, cells, pvs, options, backend)
+    sampler = HintSampler(scene, cells, pvs, options, backend)
     try:
         if doer is executor:
             sampler.renderer.close()  # each process opens one of its own
-        for hints in doer.each(Sampler.of_cell, sampler, range(count), chunk=chunk):
+        for hints in doer.each(HintSampler.of_cell, sampler, range(count), chunk=chunk):
             rows.append(hints)
             progress(len(rows), count, "coverage")
     finally:
         sampler.renderer.close()
-    return _gathered(rows, sampler)
+    return _gather(rows, sampler)
 
 
-def _gathered(cells: list[CellHints], sampler: Sampler) -> Ach:
+def _gather(cells: list[CellHints], sampler: HintSampler) -> Ach:
     none = np.zeros((len(VIEWS), 0), dtype=np.int64)
     nothing = estimate(none[:0], none, none[0], 1)  # has the types of what is joined
     rows = [nothing, *(hints.row for hints in cells)]

@@ -51,7 +51,7 @@ BEFORE = 1.0 - DEPTH_SHARE
 
 
 @dataclass(frozen=True)
-class Surfaces:
+class ItemSurfaces:
     """The geometry cut to the cells, in the form that the backends take.
 
     ``(world - centre) * scale`` lies within about 1 of the origin; scale is a power of two. Planes
@@ -69,7 +69,7 @@ class Surfaces:
     cell_count: int
 
     @staticmethod
-    def of(scene: Scene, cells: Cells) -> Surfaces:
+    def from_scene(scene: Scene, cells: Cells) -> ItemSurfaces:
         """The surfaces of a subdivided scene."""
         low, high = cells.root_box
         if len(cells.vertex):
@@ -84,7 +84,7 @@ class Surfaces:
         normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
         offset = -np.einsum("ij,ij->i", normal, vertex[cells.triangle[:, 0]])
         image = np.array([m.image for m in scene.materials], dtype=np.int32)
-        return Surfaces(
+        return ItemSurfaces(
             centre=centre,
             scale=float(scale),
             vertex=vertex,
@@ -96,16 +96,16 @@ class Surfaces:
             cell_count=cells.cell_count,
         )
 
-    def normalised(self, points: Floats) -> Floats:
+    def normalise(self, points: Floats) -> Floats:
         """(…, 3) points in world metres, in the coordinates of `vertex`."""
         return np.asarray((points - self.centre) * self.scale)
 
     def world(self, points: Floats) -> Floats:
-        """The inverse of `normalised`."""
+        """The inverse of `normalise`."""
         return np.asarray(points / self.scale + self.centre)
 
 
-class Renderer(Protocol):
+class ItemRenderer(Protocol):
     """A backend that holds its surfaces, ready to draw.
 
     Attributes

@@ -134,7 +134,7 @@ def add_pixels(
     views, size = shows.shape[1], shows.shape[2]
     for k in range(len(shows)):
         x, y, z = point[k, 0], point[k, 1], point[k, 2]
-        of = min(k, len(weight) - 1)
+        weights = min(k, len(weight) - 1)
         for v in range(views):
             for i in range(size):
                 t = shows[k, v, i]
@@ -143,8 +143,8 @@ def add_pixels(
                 side = plane[t, 0] * x + plane[t, 1] * y + plane[t, 2] * z + plane[t, 3]
                 j = column[owner[t, 0] if side > 0 else owner[t, 1]]
                 if j >= 0:
-                    at_points[k, j] += weight[of, i]
-                    in_views[v, j] += weight[of, i]
+                    at_points[k, j] += weight[weights, i]
+                    in_views[v, j] += weight[weights, i]
                 else:
                     if doubted < len(doubt):
                         doubt[doubted] = (k * views + v) * size + i

@@ -92,7 +92,7 @@ class AchOptions:
             ("placement", self.placement or "sobol", get_args(Placement)),
         ):
             if choice not in known:
-                raise _refused(f"unknown {name} '{choice}'", f"one of {', '.join(known)}")
+                raise _option_error(f"unknown {name} '{choice}'", f"one of {', '.join(known)}")
         for name, value, low, high in (
             ("samples", self.points, 1, MAX_SAMPLES),
             ("face", self.side, 1, MAX_FACE),
@@ -100,9 +100,9 @@ class AchOptions:
             ("gpu", self.gpu or 0, 0, 255),
         ):
             if not low <= value <= high:
-                raise _refused(f"{name} is {value}", f"use a number from {low} to {high}")
+                raise _option_error(f"{name} is {value}", f"use a number from {low} to {high}")
         if self.clearance is not None and not 0 < self.clearance < float("inf"):
-            raise _refused(
+            raise _option_error(
                 f"a clearance of {self.clearance} m is out of range", "use a distance above 0"
             )
         if self.tolerance is not None:
@@ -121,27 +121,27 @@ class AchOptions:
         return PRESETS[self.preset][1] if self.face is None else self.face
 
     @property
-    def placed(self) -> Placement:
+    def chosen_placement(self) -> Placement:
         """Placement of the sample points."""
         return PRESETS[self.preset][2] if self.placement is None else self.placement
 
     def _check_tolerance(self, tolerance: float) -> None:
         if not 0 < tolerance < 1:
-            raise _refused(
+            raise _option_error(
                 f"a tolerance of {tolerance} is out of range",
                 "use a total variation above 0 and below 1, such as 0.01",
             )
         if self.points < GROUPS:  # each group needs one
-            raise _refused(
+            raise _option_error(
                 f"{self.points} sample points are too few to estimate their error",
                 f"allow {GROUPS} or more, or omit --samples",
             )
-        if self.placed == "kd":
-            raise _refused(
+        if self.chosen_placement == "kd":
+            raise _option_error(
                 "--tolerance adds points step by step, which --placement kd does not support",
                 "use --placement sobol",
             )
 
 
-def _refused(problem: str, remedy: str) -> InputError:
+def _option_error(problem: str, remedy: str) -> InputError:
     return InputError("PTM-I111", problem, remedy=remedy)

@@ -67,7 +67,7 @@ def sobol(first: int, count: int, seed: int) -> Floats:
     for k in range(max(1, int(first + count).bit_length())):
         bit = (index >> np.uint64(k) & np.uint64(1)).astype(bool)
         point[bit] ^= _DIRECTIONS[:, k]
-    points = (_scrambled(point, seed) + 0.5) * 2.0**-DIGITS
+    points = (_scramble(point, seed) + 0.5) * 2.0**-DIGITS
     points.setflags(write=False)
     return np.asarray(points)
 
@@ -75,38 +75,38 @@ def sobol(first: int, count: int, seed: int) -> Floats:
 def uniform(first: int, count: int, seed: int) -> Floats:
     """(count, DIMENSIONS) independent random points ``first`` … in (0, 1), by hashing numbers."""
     number = np.arange(DIMENSIONS * first, DIMENSIONS * (first + count), dtype=np.uint64)
-    drawn = _hashed(number.reshape(count, DIMENSIONS), _hashed_seed(seed, 1))
+    drawn = _hash(number.reshape(count, DIMENSIONS), _seed_hash(seed, 1))
     return np.asarray(((drawn >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53)
 
 
-def _scrambled(point: NDArray[np.uint32], seed: int) -> NDArray[np.uint32]:
-    dimension = _hashed(np.arange(DIMENSIONS, dtype=np.uint64), _hashed_seed(seed, 0))
+def _scramble(point: NDArray[np.uint32], seed: int) -> NDArray[np.uint32]:
+    dimension = _hash(np.arange(DIMENSIONS, dtype=np.uint64), _seed_hash(seed, 0))
     turned = np.zeros_like(point)
     before = np.zeros(point.shape, dtype=np.uint64)
     for digit in range(DIGITS):
         # The digits before this one, a leading 1 to tell their number, and the dimension.
         place = before | np.uint64(1) << np.uint64(digit)
-        flip = (_hashed(place, dimension) >> np.uint64(63)).astype(np.uint32)
+        flip = (_hash(place, dimension) >> np.uint64(63)).astype(np.uint32)
         turned |= flip << np.uint32(DIGITS - 1 - digit)
         bit = point >> np.uint32(DIGITS - 1 - digit) & np.uint32(1)
         before = before << np.uint64(1) | bit
     return point ^ turned
 
 
-def _hashed_seed(seed: int, stream: int) -> Bits:
-    return _hashed(np.array([seed], dtype=np.uint64), np.array([stream], dtype=np.uint64))
+def _seed_hash(seed: int, stream: int) -> Bits:
+    return _hash(np.array([seed], dtype=np.uint64), np.array([stream], dtype=np.uint64))
 
 
-def _hashed(value: Bits, key: Bits) -> Bits:
+def _hash(value: Bits, key: Bits) -> Bits:
     """The finaliser of SplitMix64 (Steele, Lea and Flood 2014), twice, the key between."""
 
-    def mixed(x: Bits) -> Bits:
+    def mix(x: Bits) -> Bits:
         x = x + np.uint64(0x9E3779B97F4A7C15)
         x = (x ^ x >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
         x = (x ^ x >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
         return x ^ x >> np.uint64(31)
 
-    return mixed(mixed(value) ^ key)
+    return mix(mix(value) ^ key)
 
 
 #: Points of the cloud that is divided into parts, for each part: enough that parts of equal count
@@ -135,7 +135,7 @@ def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
     return np.asarray(base + offset, dtype=np.float64)
 
 
-class Volume:
+class CellVolume:
     """The volume of a cell to place points in.
 
     Attributes
@@ -156,7 +156,7 @@ class Volume:
             self.boxed = float(self.volume.sum()) / size >= FILLED
 
     @staticmethod
-    def of_cells(cells: Cells) -> list[Volume]:
+    def of_cells(cells: Cells) -> list[CellVolume]:
         """All cells; those without standing room are empty."""
         tetrahedra, leaf = cells.tetrahedra()
         volume = volumes(tetrahedra)
@@ -166,7 +166,7 @@ class Volume:
         rows = np.split(order, np.searchsorted(cell[order], np.arange(cells.cell_count)))[1:]
         eyes = cells.eyes
         return [
-            Volume(cells, c, eyes, (tetrahedra[rows[c]], volume[rows[c]]))
+            CellVolume(cells, c, eyes, (tetrahedra[rows[c]], volume[rows[c]]))
             for c in range(cells.cell_count)
         ]
 
@@ -175,22 +175,22 @@ class Volume:
         """Whether eyes may be anywhere in the cell."""
         return self.empty or self._eyes.everywhere
 
-    def anywhere(self) -> Volume:
+    def anywhere(self) -> CellVolume:
         """The same leaves, with eyes anywhere in them."""
         everywhere = EyeRegion(np.zeros((0, 3, 3)), self._cells.walker)
-        return Volume(self._cells, self._cell, everywhere, (self.tetrahedra, self.volume))
+        return CellVolume(self._cells, self._cell, everywhere, (self.tetrahedra, self.volume))
 
     def random(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) independent points ``first`` …: positions in metres, and two more
         coordinates in (0, 1)."""
-        return self._filled(uniform(first, count, seed))
+        return self._fill(uniform(first, count, seed))
 
     def sobol(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
         positions in metres, and two more coordinates in (0, 1)."""
         unit = sobol(first, count, seed)
         if self.empty or not self.boxed:
-            return self._filled(unit)
+            return self._fill(unit)
         points = self._low + unit[:, :3] * self._size
         leaf = self._cells.locate_leaf(points)
         inside = (leaf >= 0) & (self._cells.leaf_cell[leaf] == self._cell)
@@ -201,11 +201,11 @@ class Volume:
     def parts(self, count: int, seed: int) -> list[Floats]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
-        points = self._filled(sobol(0, CLOUD * count, seed))[:, :3]
+        points = self._fill(sobol(0, CLOUD * count, seed))[:, :3]
         groups = strata(points, count) if len(points) >= count else []
         return [points[group[:: -(-len(group) // TRIES)]] for group in groups]
 
-    def _filled(self, unit: Floats) -> Floats:
+    def _fill(self, unit: Floats) -> Floats:
         if self.empty:
             return np.zeros((0, 5))
         points = filling(self.tetrahedra, self.volume, unit)
@@ -223,13 +223,13 @@ def strata(points: Floats, parts: int) -> list[Ints]:
     done: list[Ints] = []
     while pending:
         group, share = pending.pop()
-        here = points[group]
+        members = points[group]
         if share == 1:
-            away = np.sum((here - here.mean(axis=0)) ** 2, axis=1)
+            away = np.sum((members - members.mean(axis=0)) ** 2, axis=1)
             done.append(group[np.argsort(away, kind="stable")])
             continue
-        axis = int(np.argmax(np.ptp(here, axis=0)))
-        order = group[np.argsort(here[:, axis], kind="stable")]
+        axis = int(np.argmax(np.ptp(members, axis=0)))
+        order = group[np.argsort(members[:, axis], kind="stable")]
         low = share // 2
         middle = len(order) * low // share
         pending.append((order[middle:], share - low))

@@ -39,10 +39,10 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints, cross, normals, ranges
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import BACKENDS
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces
+from ptmtools.coverage.item_buffer import VIEWS, ItemSurfaces
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sample_points import SamplePoints
-from ptmtools.coverage.sampling import Sampler
+from ptmtools.coverage.sampling import HintSampler
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import gradients
 from ptmtools.scene.model import Scene
@@ -99,7 +99,7 @@ def compute_need(
     options = AchOptions(
         samples=points, face=FACE, backend="embree", weighting="solid-angle", placement="sobol"
     )
-    sampler = Sampler(scene, cells, pvs, options, BACKENDS["embree"])
+    sampler = HintSampler(scene, cells, pvs, options, BACKENDS["embree"])
     try:
         wanting = _Wanting(scene, cells, sizes, sampler)
         shares = []
@@ -109,24 +109,27 @@ def compute_need(
         progress(cells.cell_count, cells.cell_count, "need")
     finally:
         sampler.renderer.close()
-    return _gathered(shares)
+    return _gather(shares)
 
 
 class _Wanting:
     """Computes the levels that the pixels at any sample points want."""
 
     def __init__(
-        self, scene: Scene, cells: Cells, sizes: Mapping[int, TextureSize], sampler: Sampler
+        self, scene: Scene, cells: Cells, sizes: Mapping[int, TextureSize], sampler: HintSampler
     ) -> None:
         self._renderer = sampler.renderer
-        self._surfaces = surfaces = Surfaces.of(scene, cells)
+        self._surfaces = surfaces = ItemSurfaces.from_scene(scene, cells)
         self._weight = sampler.weight
         images = max(sizes, default=-1) + 1
         size = np.zeros((images + 1, 2))
         #: The finest level of each image; -1 without a texture, as the image -1, which comes last.
         self._finest = np.full(images + 1, -1, dtype=np.int64)
-        for image, each in sizes.items():
-            size[image], self._finest[image] = (each.width, each.height), each.levels - 1
+        for image, image_size in sizes.items():
+            size[image], self._finest[image] = (
+                (image_size.width, image_size.height),
+                image_size.levels - 1,
+            )
         self._image = np.where(surfaces.image < images, surfaces.image, -1)
         source = cells.triangle_source
         self._gradient = gradients(scene.corners, scene.uv)[source] * size[self._image][..., None]
@@ -134,9 +137,9 @@ class _Wanting:
     def shares(self, points: SamplePoints) -> Floats:
         """(I, L) share of the view from the points that wants each level of each image."""
         wanted = np.zeros((len(self._finest) - 1, max(int(self._finest.max()), 0) + 1))
-        total, most = 0.0, self._renderer.most
-        for first in range(0, len(points), most):
-            part = points.part(slice(first, first + most))
+        total, batch = 0.0, self._renderer.most
+        for first in range(0, len(points), batch):
+            part = points.part(slice(first, first + batch))
             rays = len(part) * len(VIEWS) * FACE**2
             weight = np.repeat(self._weight(part), len(VIEWS), axis=0).ravel().astype(np.float64)
             eye = np.repeat(part.position, rays // len(part), axis=0)
@@ -174,7 +177,7 @@ def levels_of_detail(ray: Floats, normal: Floats, gradient: Floats) -> Floats:
     return np.asarray(np.where(np.isnan(detail), np.inf, detail))
 
 
-def _gathered(parts: list[Floats]) -> Need:
+def _gather(parts: list[Floats]) -> Need:
     """For each cell, the (I, L) shares that want exactly that level."""
     counts, images, firsts, lengths, shares = [0], [], [], [0], [np.zeros(0)]
     for wanted in parts:
@@ -207,7 +210,7 @@ _AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
-class Screen:
+class VisitorScreen:
     """The screen of a visitor.
 
     Attributes
@@ -230,7 +233,7 @@ class Screen:
 
 
 def unresolved_levels(
-    scene: Scene, cells: Cells, pvs: Pvs, sizes: Sequence[tuple[int, int]], screen: Screen
+    scene: Scene, cells: Cells, pvs: Pvs, sizes: Sequence[tuple[int, int]], screen: VisitorScreen
 ) -> Ints:
     """(I,) the number of finest levels of each image that no eye resolves; `ALL` if no eye sees it.
     Normal maps keep their levels.
@@ -265,9 +268,9 @@ def _texels(scene: Scene, sizes: Floats) -> Floats:
     # Sum and root of the product of the squares of the singular values.
     total = (gradient**2).sum(axis=(1, 2))
     product = np.linalg.norm(cross(gradient[:, 0], gradient[:, 1]), axis=1)
-    most = np.sqrt((total + np.sqrt(np.maximum(total**2 - 4 * product**2, 0.0))) / 2)
-    least = np.divide(product, most, out=np.zeros_like(most), where=most > 0)
-    counted = np.maximum(least / 2, most / (ANISOTROPY * np.sqrt(2)))
+    longest = np.sqrt((total + np.sqrt(np.maximum(total**2 - 4 * product**2, 0.0))) / 2)
+    shortest = np.divide(product, longest, out=np.zeros_like(longest), where=longest > 0)
+    counted = np.maximum(shortest / 2, longest / (ANISOTROPY * np.sqrt(2)))
     flat = ~normals(scene.corners).any(axis=1)
     return np.asarray(np.where(flat, np.inf, counted))
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats
-from ptmtools.coverage.placement import FILLED, TRIES, Volume, sobol
-from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.placement import FILLED, TRIES, CellVolume, sobol
+from ptmtools.coverage.solids import SampleObstacles
 
 #: Points of a sequence that are tried together, at least.
 BATCH = 64
@@ -48,8 +48,8 @@ class PointFinder:
     point is usable.
     """
 
-    volume: Volume
-    obstacles: Obstacles
+    volume: CellVolume
+    obstacles: SampleObstacles
     clearance: float
     rejected: int = 0
     _best: tuple[bool, float, Floats] | None = field(default=None, init=False)
@@ -78,9 +78,9 @@ class PointFinder:
             self.rejected += int(good[0]) if len(good) else len(part)
             chosen += [np.append(part[i], shift[number]) for i in good[:1]]
         rows = np.array(chosen).reshape(-1, 5)
-        return self.at(rows[:, :3], rows[:, 3:])
+        return self.samples_at(rows[:, :3], rows[:, 3:])
 
-    def at(self, points: Floats, unit: Floats) -> SamplePoints:
+    def samples_at(self, points: Floats, unit: Floats) -> SamplePoints:
         """Sample points at usable positions, shifted by two coordinates in (0, 1) each."""
         return SamplePoints(points, np.full(len(points), self.clearance), 2 * unit - 1)
 
@@ -88,7 +88,7 @@ class PointFinder:
         """The fallback if no point is usable: a point outside solids, if possible, and farthest
         from all surfaces. None in a cell without volume."""
         if self._best is None:
-            return self.at(np.zeros((0, 3)), np.zeros((0, 2)))
+            return self.samples_at(np.zeros((0, 3)), np.zeros((0, 2)))
         _, free, point = self._best
         # On the surface itself no clearance is right, but the near plane needs one.
         near = free or self.clearance * np.finfo(np.float32).eps
@@ -114,8 +114,8 @@ class PointSequence:
         finder = self._finder
         self._asked += count
         while not finder.volume.empty and int(self._good.sum()) < count:
-            most = TRIES * self._asked
-            if self._rejected > most or self._next > most / FILLED:
+            limit = TRIES * self._asked
+            if self._rejected > limit or self._next > limit / FILLED:
                 break
             # Every cell asks for the same stretches, which are computed once.
             size = max(BATCH, self._next // 4 or 1 << (count - 1).bit_length())
@@ -130,4 +130,4 @@ class PointSequence:
         taken = self._waiting[last]
         finder.rejected += end - len(last)
         self._waiting, self._good = self._waiting[end:], self._good[end:]
-        return finder.at(taken[:, :3], taken[:, 3:])
+        return finder.samples_at(taken[:, :3], taken[:, 3:])

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import Backend
-from ptmtools.coverage.item_buffer import Surfaces
+from ptmtools.coverage.item_buffer import ItemSurfaces
 from ptmtools.coverage.options import GROUPS, AchOptions
-from ptmtools.coverage.placement import Volume
+from ptmtools.coverage.placement import CellVolume
 from ptmtools.coverage.sample_points import PointFinder, PointSequence, SamplePoints
-from ptmtools.coverage.solids import Obstacles
-from ptmtools.coverage.tally import PixelCounter, Tally
+from ptmtools.coverage.solids import SampleObstacles
+from ptmtools.coverage.tally import PixelCounter, PixelTally
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
@@ -39,7 +39,7 @@ RULE_OF_THREE = 3.0
 
 
 @dataclass(frozen=True)
-class Row:
+class HintRow:
     """The hints of one cell, for each of the n cells of its PVS: see `Ach`.
 
     `uncertain` is NaN with fewer than eight points, which are too few: with two the bound held in
@@ -68,13 +68,13 @@ def shares(counts: Ints) -> Floats:
     return np.asarray(share)
 
 
-def estimate(at_points: Ints, in_views: Ints, group: Ints, unit: int) -> Row:
+def estimate(at_points: Ints, in_views: Ints, group: Ints, unit: int) -> HintRow:
     """The hints from (K, n) weighted pixels at K points, each of the (K,) ``group``, and (6, n) of
     the same in each view; a pixel in the middle of a view weighs ``unit``."""
     total = in_views.sum(axis=0)
     value = shares(total)
     error, uncertain = spread(at_points, group)
-    return Row(
+    return HintRow(
         value=value,
         pixels=total / unit,
         error=np.where(total > 0, error, np.nan),
@@ -114,7 +114,7 @@ def ninety_fifth(counts: Ints) -> Floats:
     return np.asarray(np.partition(at_points, rank, axis=0)[rank])
 
 
-def grouped(count: int, in_stretches: bool = True) -> Ints:
+def group_numbers(count: int, in_stretches: bool = True) -> Ints:
     """(count,) the group of each of a sequence of points: eight stretches of equal length; or,
     where neighbours follow one another, every eighth point."""
     groups = min(GROUPS, count)
@@ -138,7 +138,7 @@ class CellHints:
     """The results for one cell; see `Ach`. For the images within the entries of its row: the number
     in each entry, (n,), the images, (m,), -1 for none, and their (m,) shares of the row."""
 
-    row: Row
+    row: HintRow
     missed: float
     samples: int
     rejected: int
@@ -147,7 +147,7 @@ class CellHints:
     texture_value: Floats
 
 
-class Sampler:
+class HintSampler:
     """Samples any cell of a scene with an open `renderer`. Pickled as its arguments, without the
     images, whose bytes are not needed."""
 
@@ -156,10 +156,10 @@ class Sampler:
     ) -> None:
         self.scene, self.cells, self.pvs = scene, cells, pvs
         self.options, self.backend = options, backend
-        self._obstacles = Obstacles.of(scene, cells)
-        self._volumes = Volume.of_cells(cells)
+        self._obstacles = SampleObstacles.from_scene(scene, cells)
+        self._volumes = CellVolume.of_cells(cells)
         self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
-        surfaces = Surfaces.of(scene, cells)
+        surfaces = ItemSurfaces.from_scene(scene, cells)
         self.renderer = backend.open(surfaces, options.side, options.gpu)
         self._counter = PixelCounter(
             self.renderer,
@@ -172,7 +172,7 @@ class Sampler:
 
     def __reduce__(self) -> tuple[Any, ...]:
         scene = replace(self.scene, images=())
-        return Sampler, (scene, self.cells, self.pvs, self.options, self.backend)
+        return HintSampler, (scene, self.cells, self.pvs, self.options, self.backend)
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
@@ -180,22 +180,22 @@ class Sampler:
         owners = self._counter.owners
         wanted, begin = owners.in_cells(self.pvs.row(cell))
 
-        def count(points: SamplePoints) -> Tally:
+        def count(points: SamplePoints) -> PixelTally:
             return self._counter.count(points, wanted)
 
-        tallied = self._tallied(finder, count, begin)
-        if tallied is None and not finder.volume.everywhere:  # eyes fit almost nowhere in the cell
+        counted = self._tally(finder, count, begin)
+        if counted is None and not finder.volume.everywhere:  # eyes fit almost nowhere in the cell
             finder = replace(finder, volume=finder.volume.anywhere())
-            tallied = self._tallied(finder, count, begin)
-        if tallied is None:
+            counted = self._tally(finder, count, begin)
+        if counted is None:
             points = finder.least_bad()
-            tallied = count(points), np.zeros(len(points), dtype=np.int64)
-        tally, group = tallied
+            counted = count(points), np.zeros(len(points), dtype=np.int64)
+        tally, group = counted
         owned = shares(tally.in_views.sum(axis=0))
         met = np.flatnonzero(owned)
         entry = np.searchsorted(begin, met, "right") - 1
         total = int(tally.in_views.sum()) + int(tally.missed.sum())
-        by_cell = tally.grouped(begin)
+        by_cell = tally.group(begin)
         return CellHints(
             row=estimate(by_cell.at_points, by_cell.in_views, group, self._counter.unit),
             missed=int(tally.missed.sum()) / max(total, 1),
@@ -206,16 +206,16 @@ class Sampler:
             texture_value=owned[met],
         )
 
-    def _tallied(
-        self, finder: PointFinder, count: Callable[[SamplePoints], Tally], begin: Ints
-    ) -> tuple[Tally, Ints] | None:
+    def _tally(
+        self, finder: PointFinder, count: Callable[[SamplePoints], PixelTally], begin: Ints
+    ) -> tuple[PixelTally, Ints] | None:
         """The tally, and the (K,) group of each point; None without points."""
         if self.options.tolerance is not None:
             return self._until_certain(finder, count, begin, self.options.tolerance)
         points = self._points(finder)
         if not len(points):
             return None
-        return count(points), grouped(len(points), self.options.placed != "kd")
+        return count(points), group_numbers(len(points), self.options.chosen_placement != "kd")
 
     def points_of(self, cell: int) -> SamplePoints:
         """The sample points of one cell, without a tolerance."""
@@ -233,23 +233,23 @@ class Sampler:
 
     def _points(self, finder: PointFinder) -> SamplePoints:
         options = self.options
-        if options.placed == "kd":
+        if options.chosen_placement == "kd":
             return finder.of_parts(options.points, options.seed)
-        return PointSequence(finder, options.placed, options.seed).take(options.points)
+        return PointSequence(finder, options.chosen_placement, options.seed).take(options.points)
 
     def _until_certain(
         self,
         finder: PointFinder,
-        count: Callable[[SamplePoints], Tally],
+        count: Callable[[SamplePoints], PixelTally],
         begin: Ints,
         tolerance: float,
-    ) -> tuple[Tally, Ints] | None:
+    ) -> tuple[PixelTally, Ints] | None:
         """`_tallied` at points of eight independent sequences, doubled until the hints are
         certain."""
         options = self.options
         seeds = ((options.seed << 3) + g + (1 << 35) for g in range(GROUPS))
-        sequences = [PointSequence(finder, options.placed, seed) for seed in seeds]
-        tallies: list[Tally] = []
+        sequences = [PointSequence(finder, options.chosen_placement, seed) for seed in seeds]
+        tallies: list[PixelTally] = []
         group = np.zeros(0, dtype=np.int64)
         before = np.inf
         more = max(1, min(FIRST, options.points // GROUPS))
@@ -259,9 +259,9 @@ class Sampler:
             points = SamplePoints.join(parts)
             if not len(added) and not tallies:
                 return None
-            tallies = [Tally.join([*tallies, count(points)])]
+            tallies = [PixelTally.join([*tallies, count(points)])]
             group = np.concatenate([group, added])
-            by_cell = tallies[0].grouped(begin).at_points
+            by_cell = tallies[0].group(begin).at_points
             now = spread(by_cell, group)[1]
             bound, before = max(now, before * FALL), now
             more = min(len(group) // GROUPS, (options.points - len(group)) // GROUPS)

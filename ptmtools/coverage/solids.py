@@ -62,15 +62,15 @@ class Solid:
         from ptmtools.coverage.kernels import crossings
 
         turned = np.einsum("ij,kj->ik", points, FRAMES[ray])
-        order, first, end = by_x(turned, self._turned[ray], 0.0)
+        order, first, end = by_x(turned, self._in_frames[ray], 0.0)
         crossed = np.zeros(len(points), dtype=np.int64)
-        crossings(turned[order], self._turned[ray], first, end, crossed)
+        crossings(turned[order], self._in_frames[ray], first, end, crossed)
         odd = np.empty(len(points), dtype=np.bool_)
         odd[order] = crossed % 2 > 0
         return odd
 
     @cached_property
-    def _turned(self) -> list[Floats]:
+    def _in_frames(self) -> list[Floats]:
         """The corners in each of the frames."""
         return [np.einsum("tij,kj->tik", self.corners, frame) for frame in FRAMES]
 
@@ -117,8 +117,8 @@ def edge_groups(edge: Ints) -> Ints:
     to it through shared edges."""
     order = np.argsort(edge, axis=None, kind="stable")
     same = np.flatnonzero(np.diff(edge.reshape(-1)[order]) == 0)
-    one, other = order[same] // 3, order[same + 1] // 3
-    return connected(len(edge), np.stack([one, other], axis=1))
+    first, second = order[same] // 3, order[same + 1] // 3
+    return connected(len(edge), np.stack([first, second], axis=1))
 
 
 def closed_and_oriented(edge: Ints, forward: Bools, group: Ints) -> tuple[Bools, Bools]:
@@ -146,7 +146,7 @@ def boundary_area(scene: Scene, cells: Cells) -> Floats:
 
 
 @dataclass(frozen=True)
-class Obstacles:
+class SampleObstacles:
     """The surfaces and solids that a sample point has to keep clear of."""
 
     corners: Floats  # (T, 3, 3) all surfaces, metres
@@ -155,12 +155,12 @@ class Obstacles:
     boxes: Floats  # (B, 2, 3) their bounding boxes
 
     @staticmethod
-    def of(scene: Scene, cells: Cells) -> Obstacles:
+    def from_scene(scene: Scene, cells: Cells) -> SampleObstacles:
         """The obstacles of a subdivided scene."""
         corners = scene.corners
         bodies = tuple(solids(scene, cells))
         boxes = np.array([solid.box for solid in bodies]).reshape(-1, 2, 3)
-        return Obstacles(corners, Nearby(corners, 0.0), bodies, boxes)
+        return SampleObstacles(corners, Nearby(corners, 0.0), bodies, boxes)
 
     def in_solid(self, points: Floats) -> Bools:
         """(n,) whether each of the (n, 3) points is inside a solid."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Ints, ranges
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
+from ptmtools.coverage.item_buffer import VIEWS, ItemRenderer, ItemSurfaces
 from ptmtools.coverage.sample_points import SamplePoints
 
 #: Weight of a pixel in the middle of a view where pixels are weighted by solid angle.
@@ -41,7 +41,7 @@ class Owners:
     images: int  # more than any image of the scene, plus 1
 
     @staticmethod
-    def of(surfaces: Surfaces, by_image: bool) -> Owners:
+    def from_surfaces(surfaces: ItemSurfaces, by_image: bool) -> Owners:
         """Cells, or images within cells."""
         image = surfaces.image if by_image else np.full(len(surfaces.image), -1, np.int32)
         images = int(image.max(initial=-1)) + 2
@@ -62,7 +62,7 @@ class Owners:
         size = self.first[cells + 1] - self.first[cells]
         return ranges(self.first[cells], size), np.cumsum(size) - size
 
-    def at(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> Ints:
+    def numbers(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> Ints:
         """(n,) the owner of each of the (n,) images in each of the (n,) cells; the owner without
         image if the cell does not use the image; -1 where the cell is -1."""
         every = self.cell.astype(np.int64) * self.images + self.image + 1
@@ -73,7 +73,7 @@ class Owners:
 
 
 @dataclass(frozen=True)
-class Tally:
+class PixelTally:
     """Weighted pixels seen from K points."""
 
     at_points: Ints  # (K, m) of each of the owners asked for, at each point
@@ -81,22 +81,22 @@ class Tally:
     missed: Ints  # (K,) of all other owners
 
     @staticmethod
-    def join(parts: list[Tally]) -> Tally:
+    def join(parts: list[PixelTally]) -> PixelTally:
         """Concatenates the tallies of several sets of points."""
-        return Tally(
+        return PixelTally(
             np.concatenate([part.at_points for part in parts]),
             np.sum([part.in_views for part in parts], axis=0),
             np.concatenate([part.missed for part in parts]),
         )
 
-    def grouped(self, begin: Ints) -> Tally:
+    def group(self, begin: Ints) -> PixelTally:
         """The owners from each of the (n,) ``begin`` to the next as one."""
         if len(begin) == self.at_points.shape[1]:
             return self
         at_points, in_views = (
             np.add.reduceat(counts, begin, axis=1) for counts in (self.at_points, self.in_views)
         )
-        return Tally(at_points, in_views, self.missed)
+        return PixelTally(at_points, in_views, self.missed)
 
 
 class PixelCounter:
@@ -108,8 +108,8 @@ class PixelCounter:
 
     def __init__(
         self,
-        renderer: Renderer,
-        surfaces: Surfaces,
+        renderer: ItemRenderer,
+        surfaces: ItemSurfaces,
         cells: Cells,
         face: int,
         *,
@@ -117,40 +117,40 @@ class PixelCounter:
         by_image: bool = False,
     ) -> None:
         self.unit = SOLID_ANGLE_UNIT if by_angle else 1
-        self.owners = Owners.of(surfaces, by_image)
+        self.owners = Owners.from_surfaces(surfaces, by_image)
         self._renderer = renderer
         self._surfaces = surfaces
         self._cells = cells
         self._face = face
         self._towards = TOWARDS * cells.tolerance.plane
 
-    def count(self, points: SamplePoints, wanted: Ints) -> Tally:
+    def count(self, points: SamplePoints, wanted: Ints) -> PixelTally:
         """How many pixels show each of the (m,) ``wanted`` owners."""
         column = np.full(len(self.owners.cell) + 1, -1, dtype=np.int32)
         column[wanted] = np.arange(len(wanted))
         needed = np.zeros(self._surfaces.cell_count, dtype=np.bool_)
         needed[self.owners.cell[wanted]] = True
-        tally = Tally(
+        tally = PixelTally(
             np.zeros((len(points), len(wanted)), dtype=np.int64),
             np.zeros((len(VIEWS), len(wanted)), dtype=np.int64),
             np.zeros(len(points), dtype=np.int64),
         )
-        most = self._renderer.most
-        for first in range(0, len(points), most):
-            rows = slice(first, first + most)
-            part = Tally(tally.at_points[rows], tally.in_views, tally.missed[rows])
+        batch = self._renderer.most
+        for first in range(0, len(points), batch):
+            rows = slice(first, first + batch)
+            part = PixelTally(tally.at_points[rows], tally.in_views, tally.missed[rows])
             self._add(points.part(rows), column, needed, part)
         return tally
 
     def _add(
-        self, points: SamplePoints, column: NDArray[np.int32], needed: Bools, tally: Tally
+        self, points: SamplePoints, column: NDArray[np.int32], needed: Bools, tally: PixelTally
     ) -> None:
         """Draws views of the cells ``needed`` and adds their pixels to the ``tally``, whose
         ``column`` of each owner is -1 for one that is not expected."""
         from ptmtools.coverage.kernels import add_pixels
 
         layers = self._renderer.show(points, needed)
-        position = self._surfaces.normalised(points.position)
+        position = self._surfaces.normalise(points.position)
         weight = self.weight(points)
         size = self._face**2
         doubt = np.empty(layers[0].size, dtype=np.int64)
@@ -178,7 +178,7 @@ class PixelCounter:
         viewer = points.position[pixel // (len(VIEWS) * self._face**2)]
         hit = shows >= 0
         plane = self._surfaces.plane[shows]
-        side = np.einsum("ij,ij->i", plane[:, :3], self._surfaces.normalised(viewer)) + plane[:, 3]
+        side = np.einsum("ij,ij->i", plane[:, :3], self._surfaces.normalise(viewer)) + plane[:, 3]
         owner = self.owners.of_side[shows, np.where(side > 0, 0, 1)].astype(np.int64)
         owner[~hit | (column[owner] < 0)] = -1
         lost = np.flatnonzero(hit & (owner < 0))
@@ -188,7 +188,7 @@ class PixelCounter:
             step = np.minimum(self._towards / np.maximum(length, self._towards), 0.5)
             cell = self._cells.locate(hits[lost] + step * back)
             image = np.where(self.owners.images > 1, self._surfaces.image[shows[lost]], -1)
-            nearer = self.owners.at(cell, image)
+            nearer = self.owners.numbers(cell, image)
             owner[lost] = np.where(column[nearer] >= 0, nearer, -1)
         return owner, hit
 

@@ -79,7 +79,7 @@ def unwrap(
     area = max(areas(moved[triangles].astype(np.float64)).sum(), np.finfo(np.float32).tiny)
     for side in sizes:
         wanted = side * math.sqrt(FILLED / area)
-        packed, density = _packed(moved, triangles, parts, side, wanted, padding)
+        packed, density = _pack(moved, triangles, parts, side, wanted, padding)
         if density >= _WORTH * wanted or _longest(packed) >= _LONG * side:
             break
     placed = packed.texel / max(packed.size, side)
@@ -103,7 +103,7 @@ class _Layout(NamedTuple):
     size: int
 
 
-def _packed(
+def _pack(
     points: Singles,
     triangles: NDArray[np.integer[Any]],
     parts: list[Ints],
@@ -160,13 +160,13 @@ def cover(uv: NDArray[np.float64], size: int) -> NDArray[np.int32]:
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0:
             continue
-        left = max(0, int(np.ceil(min(ax, bx, cx) - 0.5)))
-        right = min(size - 1, int(np.floor(max(ax, bx, cx) - 0.5)))
-        top = max(0, int(np.ceil(min(ay, by, cy) - 0.5)))
-        bottom = min(size - 1, int(np.floor(max(ay, by, cy) - 0.5)))
-        for row in range(top, bottom + 1):
+        first_column = max(0, int(np.ceil(min(ax, bx, cx) - 0.5)))
+        last_column = min(size - 1, int(np.floor(max(ax, bx, cx) - 0.5)))
+        first_row = max(0, int(np.ceil(min(ay, by, cy) - 0.5)))
+        last_row = min(size - 1, int(np.floor(max(ay, by, cy) - 0.5)))
+        for row in range(first_row, last_row + 1):
             y = row + 0.5
-            for column in range(left, right + 1):
+            for column in range(first_column, last_column + 1):
                 x = column + 0.5
                 u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
                 v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
@@ -187,10 +187,13 @@ def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32
     for t in range(len(uv)):
         for k in range(3):
             x[k], y[k] = uv[t, k, 0] * size - 0.5, (1 - uv[t, k, 1]) * size - 0.5
-        left, right = max(0, int(np.ceil(x.min() - 1))), min(size - 1, int(x.max() + 1))
-        top, bottom = max(0, int(np.ceil(y.min() - 1))), min(size - 1, int(y.max() + 1))
-        for row in range(top, bottom + 1):
-            for column in range(left, right + 1):
+        first_column, last_column = (
+            max(0, int(np.ceil(x.min() - 1))),
+            min(size - 1, int(x.max() + 1)),
+        )
+        first_row, last_row = max(0, int(np.ceil(y.min() - 1))), min(size - 1, int(y.max() + 1))
+        for row in range(first_row, last_row + 1):
+            for column in range(first_column, last_column + 1):
                 if owner[row, column] >= 0:
                     continue
                 least = np.inf
@@ -201,11 +204,11 @@ def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32
                     # Along the normal of a side: the face, and the square that reads the texel.
                     low = high = 0.0
                     for j in range(3):
-                        far = down * (x[j] - x[k]) - across * (y[j] - y[k])
-                        low, high = min(low, far), max(high, far)
-                    here = down * (column - x[k]) - across * (row - y[k])
+                        distance = down * (x[j] - x[k]) - across * (y[j] - y[k])
+                        low, high = min(low, distance), max(high, distance)
+                    offset = down * (column - x[k]) - across * (row - y[k])
                     wide = abs(across) + abs(down)
-                    apart = apart or (wide > 0 and (here + wide <= low or here - wide >= high))
+                    apart = apart or (wide > 0 and (offset + wide <= low or offset - wide >= high))
                     long = across * across + down * down
                     share = 0.0
                     if long > 0:
@@ -237,10 +240,10 @@ def nearest(uv: Floats, at: Floats) -> Floats:
         long = np.einsum("nx,nx->n", way, way)
         along = np.einsum("nx,nx->n", place - start, way)
         along = np.clip(np.divide(along, long, out=np.zeros_like(long), where=long > 0), 0, 1)
-        far = np.linalg.norm(start + along[:, None] * way - place, axis=1)
-        nearer = far < best
+        distance = np.linalg.norm(start + along[:, None] * way - place, axis=1)
+        nearer = distance < best
         rows = outside[nearer]
-        best[nearer], result[rows] = far[nearer], 0.0
+        best[nearer], result[rows] = distance[nearer], 0.0
         result[rows, k], result[rows, (k + 1) % 3] = 1 - along[nearer], along[nearer]
     return result
 

@@ -9,7 +9,7 @@ The light is that of the model's own lightmaps, or ambient obscurance (`light.oc
 of lamps and the sky (`light.mixing`). Of ambient light, a ray that meets nothing within reach
 counts whole. More of it comes from above than from below, so that forms show where nothing is near:
 a white statue in a white room. Indoors, all surfaces have something within reach in many
-directions; so that pictures keep about their colours, all light is brightened (`exposed`).
+directions; so that pictures keep about their colours, all light is brightened (`expose`).
 
 A piece that shows both sides has the light of the side on which its cell lies. If that is either,
 as of a screen within a room, the more open side counts.
@@ -18,6 +18,7 @@ as of a screen within a room, the more open side counts.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -27,9 +28,10 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.light.atlas import FILLED, unwrap
 from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
-from ptmtools.light.looks import Painted, Rays, open_sides, planes
-from ptmtools.light.mixing import Mix, Mixed
-from ptmtools.light.occlusion import Surroundings, normals
+from ptmtools.light.looks import SMALLEST, PaintedLight, RayLight, open_sides, planes
+from ptmtools.light.mixing import LightMix, MixedLight
+from ptmtools.light.model import CellSurfaces
+from ptmtools.light.occlusion import Occluders, normals
 
 if TYPE_CHECKING:
     from ptmtools.light.options import LightOptions
@@ -55,29 +57,16 @@ _LARGEST = 2048
 #: Texels between charts: coordinates are rounded by up to a tenth of a texel in GLBs, and would
 #: read the edge of another chart, a thin dark line.
 _PADDING = 1
-
-
-@dataclass(frozen=True)
-class Piece:
-    """The surfaces of one cell.
-
-    Attributes
-    ----------
-    corner: (n, 3, 3) float32 metres.
-    object, shape: (n,) of the scene; of the cell, ascending.
-    glass: (n,) whether the surface has no light of its own: it is seen through, or glows.
-    dense: (n,) whether its light is at vertices.
-    side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
-    face: (n,) the triangle of the scene that it is a piece of.
-    """
-
-    corner: NDArray[np.float32]
-    object: Ints
-    shape: Ints
-    glass: Bools
-    dense: Bools
-    side: NDArray[np.int8]
-    face: Ints
+#: By default, lightmaps are to have at most this share of the bytes of the model's images. Fewer
+#: texels to the metre are tried before there is no light at all: an office with one image of 60 kB
+#: would get lightmaps of 390 kB.
+SHARE = 0.1
+#: The least share of the texels to the metre.
+LEAST = 0.5
+#: Texels of the smallest lightmap: a building with fewer shows no light, but is of another scale.
+_SMALLEST = 16**2
+#: Bytes of a texel (0.24 in a hospital, 0.25 in an office, 0.38 in a museum).
+_TEXEL_BYTES = 0.3
 
 
 @dataclass(frozen=True)
@@ -100,7 +89,7 @@ class CellLight:
 
 
 @dataclass(frozen=True)
-class Baking:
+class LightBaking:
     """The shared input of all tasks.
 
     Attributes
@@ -110,12 +99,12 @@ class Baking:
     painted: the light of the model's own lightmaps, for the faces of the scene, instead of rays.
     """
 
-    around: Surroundings
+    around: Occluders
     options: LightOptions
-    mix: Mix = Mix()  # noqa: RUF009 - a frozen value
-    painted: Painted | None = None
+    mix: LightMix = LightMix()  # noqa: RUF009 - a frozen value
+    painted: PaintedLight | None = None
 
-    def light(self, piece: Piece) -> CellLight:
+    def light(self, piece: CellSurfaces) -> CellLight:
         """The light of a cell. Raises MissingComponentError PTM-M100: xatlas is not installed."""
         count = int(piece.shape[-1]) + 1 if len(piece.shape) else 0
         dense, flat = piece.dense & ~piece.glass, ~piece.dense & ~piece.glass
@@ -125,36 +114,39 @@ class Baking:
         uv = np.zeros((len(corner), 3, 2), np.float32)
         vertex = np.full((len(corner), 3), 255, np.uint8)
         side = self.sides(corner, piece.side)
-        for own in _objects(piece.object, dense):
-            look = self.look(corner[own], side[own], piece.face[own], _AT_VERTICES)
-            vertex[own] = self._encoded(vertex_light(look, corner[own], normals(corner[own])))
+        for rows in _objects(piece.object, dense):
+            look = self.look(corner[rows], side[rows], piece.face[rows], _AT_VERTICES)
+            vertex[rows] = self._encode(vertex_light(look, corner[rows], normals(corner[rows])))
         if not flat.any():
             return CellLight(mapped, uv, vertex, None, False)
-        own = np.flatnonzero(flat)
-        points, triangles = np.unique(piece.corner[own].reshape(-1, 3), axis=0, return_inverse=True)
-        area, density = areas(corner[own]), self.options.light_density
+        rows = np.flatnonzero(flat)
+        points, triangles = np.unique(
+            piece.corner[rows].reshape(-1, 3), axis=0, return_inverse=True
+        )
+        area, density = areas(corner[rows]), self.options.light_density
         if self.painted is not None:
-            density = min(density, self.painted.density(piece.face[own], area))
+            density = min(density, self.painted.density(piece.face[rows], area))
         sizes = _sizes(float(area.sum()), density)
         atlas = unwrap(
             points.astype(np.float64),
             triangles.reshape(-1, 3).astype(np.int32),
             sizes,
             padding=_PADDING,
-            group=_groups(corner[own], side[own]),
+            group=_groups(corner[rows], side[rows]),
         )
-        look = self.look(corner[own], side[own], piece.face[own])
+        look = self.look(corner[rows], side[rows], piece.face[rows])
         size = atlas.side or sizes[-1]
         least = COVERED if self.painted is None else 0.0
-        (lit,) = bake(look, corner[own], atlas, look.grain, (size,), least=least)
-        uv[own] = atlas.uv
-        texels_a_metre = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), 1e-9))
-        reached = texels_a_metre / max(density, 1e-9)
-        texels = self._encoded(lit.value)
+        (lit,) = bake(look, corner[rows], atlas, look.grain, (size,), least=least)
+        uv[rows] = atlas.uv
+        texels_a_metre = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), SMALLEST))
+        reached = texels_a_metre / max(density, SMALLEST)
+        texels = self._encode(lit.value)
         return CellLight(mapped, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
 
     def sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
-        """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back; ``side``: see `Piece`."""
+        """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back; ``side``: see
+        `CellSurfaces`."""
         either = side == 0
         result = np.where(side < 0, -1.0, 1.0)
         if either.any() and self.painted is None:
@@ -166,34 +158,37 @@ class Baking:
 
     def look(
         self, corner: Floats, side: Floats, face: Ints, rays: float = 1.0
-    ) -> Rays | Mixed | Painted:
+    ) -> RayLight | MixedLight | PaintedLight:
         """The light of (n, 3, 3) faces on their (n,) `sides`, by this share of the rays of the
-        options; (n,) ``face``: see `Piece`."""
+        options; (n,) ``face``: see `CellSurfaces`."""
         if self.painted is not None:
             return replace(self.painted, source=self.painted.source[face])
         samples, reach = math.ceil(rays * self.options.light_samples), self.options.light_reach
-        return self.mix.look(Rays(self.around, corner, samples, reach, side=side, above=ABOVE))
+        return self.mix.look(RayLight(self.around, corner, samples, reach, side=side, above=ABOVE))
 
-    def _encoded(self, light: Floats | Singles) -> NDArray[np.uint8]:
+    def _encode(self, light: Floats | Singles) -> NDArray[np.uint8]:
         """Light in 255ths: as exposed, or that of the model."""
         if self.painted is None:
-            return encoded(light)
+            return encode(light)
         return np.asarray(np.rint(255 * np.clip(light, REFLECTED, 1.0)), np.uint8)
 
 
-def exposed(light: Floats | Singles) -> Floats:
+def expose(light: Floats | Singles) -> Floats:
     """Light with that by reflection, brightened, from 0 to 1."""
     return np.clip(EXPOSURE * (REFLECTED + (1 - REFLECTED) * light), 0.0, 1.0).astype(np.float64)
 
 
-def encoded(light: Floats | Singles) -> NDArray[np.uint8]:
+def encode(light: Floats | Singles) -> NDArray[np.uint8]:
     """Light as exposed, in 255ths."""
-    return np.rint(255 * exposed(light)).astype(np.uint8)
+    return np.rint(255 * expose(light)).astype(np.uint8)
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:
     """The chosen pieces of each object."""
-    return [np.flatnonzero(chosen & (number == one)) for one in np.unique(number[chosen]).tolist()]
+    return [
+        np.flatnonzero(chosen & (number == object_number))
+        for object_number in np.unique(number[chosen]).tolist()
+    ]
 
 
 def _groups(corner: Floats, side: Floats) -> Ints:
@@ -210,3 +205,26 @@ def _sizes(area: float, density: float) -> tuple[int, ...]:
     texels = math.sqrt(area / FILLED) * density
     side = min(_LARGEST, _MULTIPLE * max(1, math.ceil(texels / _MULTIPLE)))
     return tuple(dict.fromkeys(min(_LARGEST, side * k) for k in (1, 2, 4)))
+
+
+def round_bytes(images: int) -> int:
+    """The bytes of images, or somewhat less: a power of two, so that light stays the same if they
+    are repainted; 0 for none."""
+    return 1 << images.bit_length() - 1 if images else 0
+
+
+def expected_bytes(pieces: Sequence[CellSurfaces], density: float) -> float:
+    """The bytes that lightmaps are expected to have; ``density``: texels to the metre."""
+    flat = (surfaces.corner[~surfaces.dense & ~surfaces.glass] for surfaces in pieces)
+    area = sum(float(areas(corner.astype(np.float64)).sum()) for corner in flat)
+    return area / FILLED * density**2 * _TEXEL_BYTES
+
+
+def affordable_density(pieces: Sequence[CellSurfaces], density: float, images: int) -> float:
+    """The texels to the metre of lightmaps beside images of a number of bytes (`round_bytes`), at
+    most ``density``; 0 if light would cost too much, or there is no surface for it."""
+    cost = expected_bytes(pieces, density)
+    if cost < _SMALLEST * _TEXEL_BYTES:
+        return 0.0
+    fitting = min(1.0, math.sqrt(SHARE * images / cost))
+    return density * fitting if fitting >= LEAST else 0.0

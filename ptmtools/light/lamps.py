@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
-from ptmtools.jit import kernel
-from ptmtools.light.occlusion import RAYS, Surroundings, normals, points_on, spread_over
+from ptmtools.jit import inlined_kernel, kernel
+from ptmtools.light.occlusion import RAYS, Occluders, normals, points_on, spread_over
 from ptmtools.scene.lights import KINDS, Lights
 from ptmtools.scene.model import Scene
 
@@ -33,6 +33,8 @@ _PATCH, _MOST = 0.2, 4096
 _APART = 0.1
 #: A point of a lamp is no nearer than this, metres: within a bulb light would be infinite.
 _NEAREST = 0.1
+#: Least difference of the cosines of the two cones of a spot.
+_SHARPEST = 1e-6
 #: Least luminance of a material that is a lamp; less is a shine to bring out colours. If more than
 #: this share of all surfaces glows, the light of the building is part of its colours.
 LEAST, _SHARE = 0.1, 0.25
@@ -68,14 +70,14 @@ class Lamps:
 
     def only(self, chosen: Bools | Ints) -> Lamps:
         """Some of them."""
-        return Lamps(*(held[chosen] for held in vars(self).values()))
+        return Lamps(*(values[chosen] for values in vars(self).values()))
 
 
 def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
     """The lamps of a scene; none if it has none."""
     if lights is None:
         lights = Lights.none(len(scene.materials))
-    patches = _patches(scene, glowing(scene, lights))
+    patches = _patches(scene, lamp_luminance(scene, lights))
     single = Lamps(
         np.array([KINDS.index(lamp.kind) for lamp in lights.lamps], np.uint8),
         np.array([lamp.position for lamp in lights.lamps]).reshape(-1, 3),
@@ -84,11 +86,11 @@ def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
         np.zeros(len(lights.lamps)),
         np.array([lamp.cone for lamp in lights.lamps]).reshape(-1, 2),
     )
-    pairs = zip(vars(_joined(single)).values(), vars(patches).values(), strict=True)
+    pairs = zip(vars(_merge(single)).values(), vars(patches).values(), strict=True)
     return Lamps(*(np.concatenate(pair) for pair in pairs))
 
 
-def _joined(lamps: Lamps) -> Lamps:
+def _merge(lamps: Lamps) -> Lamps:
     """Lamps without a surface, at most `_MOST`: those of a kind in a cube with ways and cones alike
     become one, with the sum of their powers and the means, weighted by these, of all else."""
     lamps, size = lamps.only(lamps.power > 0), 1.0
@@ -103,12 +105,12 @@ def _joined(lamps: Lamps) -> Lamps:
             return_index=True,
             return_inverse=True,
         )
-        lamps = _together(lamps, group.ravel(), lamps.kind[first])
+        lamps = _merge_groups(lamps, group.ravel(), lamps.kind[first])
         size *= 2
     return lamps
 
 
-def _together(lamps: Lamps, group: Ints, kind: NDArray[np.uint8]) -> Lamps:
+def _merge_groups(lamps: Lamps, group: Ints, kind: NDArray[np.uint8]) -> Lamps:
     """One lamp of each (G,) kind for the lamps of each group."""
     power = np.bincount(group, lamps.power).astype(np.float64)
     share = lamps.power / power[group]
@@ -121,7 +123,7 @@ def _together(lamps: Lamps, group: Ints, kind: NDArray[np.uint8]) -> Lamps:
     return Lamps(kind, place, way, power, np.zeros(len(power)), cone)
 
 
-def glowing(scene: Scene, lights: Lights) -> Floats:
+def lamp_luminance(scene: Scene, lights: Lights) -> Floats:
     """(M,) the luminance of each material that is a lamp, 0 of the others."""
     glow = np.where(lights.glow >= LEAST, lights.glow, 0.0).astype(np.float64)
     area = areas(scene.corners)
@@ -142,7 +144,7 @@ def _patches(scene: Scene, glow: Floats) -> Lamps:
     both = scene.two_sided[faces[chosen]]
     return Lamps(
         np.where(both, _BOTH, _PATCH_KIND).astype(np.uint8),
-        _spread(corner, chosen),
+        _patch_centres(corner, chosen),
         normals(corner[chosen]),
         glow[scene.triangle_material[faces[chosen]]],
         np.full(count, total / max(count, 1)),
@@ -150,7 +152,7 @@ def _patches(scene: Scene, glow: Floats) -> Lamps:
     )
 
 
-def _spread(corner: Floats, chosen: Ints) -> Floats:
+def _patch_centres(corner: Floats, chosen: Ints) -> Floats:
     """(n, 3) points on the (n,) chosen ones of (T, 3, 3) faces; those of a face have its centre."""
     points = points_on(corner[chosen], np.arange(len(chosen)))
     times = np.maximum(np.bincount(chosen, minlength=len(corner)), 1)[:, None]
@@ -158,39 +160,39 @@ def _spread(corner: Floats, chosen: Ints) -> Floats:
     return np.asarray(points + (corner.mean(axis=1) - mean)[chosen])
 
 
-def measured(
-    around: Surroundings, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
+def measure_lamps(
+    around: Occluders, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
 ) -> Lamps:
     """The lamps with powers by which each kind has a median of 1 at those of (n, 3) points with
     (n, 3) normals that it reaches; without kinds that reach none."""
     result = []
     for kinds in ((_POINT, _SPOT), (_SUN,), (_PATCH_KIND, _BOTH)):
-        own = lamps.only(np.isin(lamps.kind, kinds))
-        light = direct(around, own, point, normal, turn, rays)
+        kind_lamps = lamps.only(np.isin(lamps.kind, kinds))
+        light = direct_light(around, kind_lamps, point, normal, turn, rays)
         if (light > 0).any():
             usual = float(np.median(light[light > 0]))
-            result.append(Lamps(*{**vars(own), "power": own.power / usual}.values()))
+            result.append(Lamps(*{**vars(kind_lamps), "power": kind_lamps.power / usual}.values()))
     if not result:
         return lamps.only(np.zeros(0, np.int64))
-    held = zip(*(vars(each).values() for each in result), strict=True)
-    return Lamps(*map(np.concatenate, held))
+    columns = zip(*(vars(lamp_rows).values() for lamp_rows in result), strict=True)
+    return Lamps(*map(np.concatenate, columns))
 
 
-def near(lamps: Lamps, corner: Floats) -> Lamps:
-    """Those lamps, `measured`, that can matter to (T, 3, 3) faces."""
+def lamps_near(lamps: Lamps, corner: Floats) -> Lamps:
+    """Those lamps, `measure_lamps`, that can matter to (T, 3, 3) faces."""
     low, high = corner.min(axis=(0, 1)), corner.max(axis=(0, 1))
-    far = np.linalg.norm(lamps.place - np.clip(lamps.place, low, high), axis=1)
+    distance = np.linalg.norm(lamps.place - np.clip(lamps.place, low, high), axis=1)
     patch = lamps.kind >= _PATCH_KIND
     size = np.where(patch, lamps.area, 1.0)
-    most = lamps.power * size / (far**2 + np.where(patch, size / math.pi, _NEAREST**2))
-    most = np.where(lamps.kind == _SUN, lamps.power, most)
-    order = np.argsort(most, kind="stable")
-    kept = np.cumsum(most[order]) > _FEW
+    largest = lamps.power * size / (distance**2 + np.where(patch, size / math.pi, _NEAREST**2))
+    largest = np.where(lamps.kind == _SUN, lamps.power, largest)
+    order = np.argsort(largest, kind="stable")
+    kept = np.cumsum(largest[order]) > _FEW
     return lamps.only(np.sort(order[kept]))
 
 
-def direct(
-    around: Surroundings, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
+def direct_light(
+    around: Occluders, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
 ) -> Floats:
     """(n,) the light of lamps at (n, 3) points with (n, 3) normals, by at most ``rays`` shadow rays
     for each point. ``turn``: (n,) shares of the way between two lamps at which choosing begins."""
@@ -200,24 +202,24 @@ def direct(
     step = max(1, RAYS // rays)
     for at in range(0, len(point), step):
         part = slice(at, at + step)
-        here = point[part] + around.lift * normal[part]
-        total, chosen, times = _chosen(
-            here, np.ascontiguousarray(normal[part]), turn[part], rays, *vars(lamps).values()
+        origin = point[part] + around.lift * normal[part]
+        total, chosen, times = _choose_lamps(
+            origin, np.ascontiguousarray(normal[part]), turn[part], rays, *vars(lamps).values()
         )
         row, column = np.nonzero(times)
         lamp = chosen[row, column]
         target = lamps.place[lamp]
         sun = lamps.kind[lamp] == _SUN
         size = 2 * np.linalg.norm(around.points.max(axis=0) - around.points.min(axis=0), axis=-1)
-        target[sun] = here[row[sun]] - size * lamps.way[lamp[sun]]
-        free = around.free(here[row], target)
-        share = np.bincount(row, times[row, column] * free, len(here)) / rays
+        target[sun] = origin[row[sun]] - size * lamps.way[lamp[sun]]
+        free = around.free(origin[row], target)
+        share = np.bincount(row, times[row, column] * free, len(origin)) / rays
         result[part] = total * share
     return result
 
 
 @kernel
-def _chosen(
+def _choose_lamps(
     point: NDArray[np.float64],
     normal: NDArray[np.float64],
     turn: NDArray[np.float64],
@@ -236,42 +238,16 @@ def _chosen(
     times = np.zeros((len(point), rays), np.int64)
     light = np.zeros(len(kind))
     for p in range(len(point)):
-        nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         for k in range(len(kind)):
-            light[k] = 0.0
-            if kind[k] == _SUN:
-                facing = -(nx * way[k, 0] + ny * way[k, 1] + nz * way[k, 2])
-                light[k] = power[k] * max(facing, 0.0)
-            else:
-                x, y, z = (
-                    place[k, 0] - point[p, 0],
-                    place[k, 1] - point[p, 1],
-                    place[k, 2] - point[p, 2],
-                )
-                facing = nx * x + ny * y + nz * z
-                if facing > 0:
-                    square = x * x + y * y + z * z
-                    far = np.sqrt(square)
-                    along = -(way[k, 0] * x + way[k, 1] * y + way[k, 2] * z) / far
-                    if kind[k] == _BOTH:
-                        along = abs(along)
-                    if kind[k] >= _PATCH_KIND:
-                        spread = area[k] * max(along, 0.0) / (square + area[k] / np.pi)
-                    else:
-                        spread = 1 / max(square, _NEAREST * _NEAREST)
-                        if kind[k] == _SPOT:
-                            edge = (along - cone[k, 1]) / max(cone[k, 0] - cone[k, 1], 1e-6)
-                            edge = min(max(edge, 0.0), 1.0)
-                            spread *= edge * edge
-                    light[k] = power[k] * spread * facing / far
+            light[k] = _lamp_light(point, normal, p, k, kind, place, way, power, area, cone)
             total[p] += light[k]
         if total[p] <= 0:
             continue
         step = total[p] / rays
-        ahead, held, used, sent = turn[p] * step, 0.0, 0, 0
+        ahead, reached, used, sent = turn[p] * step, 0.0, 0, 0
         for k in range(len(kind)):
-            held += light[k]
-            while ahead < held and sent < rays:
+            reached += light[k]
+            while ahead < reached and sent < rays:
                 if used == 0 or chosen[p, used - 1] != k:
                     chosen[p, used] = k
                     used += 1
@@ -281,3 +257,41 @@ def _chosen(
         # Rounding may leave the last ray over.
         times[p, used - 1] += rays - sent
     return total, chosen, times
+
+
+@inlined_kernel
+def _lamp_light(
+    point: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    p: int,
+    k: int,
+    kind: NDArray[np.uint8],
+    place: NDArray[np.float64],
+    way: NDArray[np.float64],
+    power: NDArray[np.float64],
+    area: NDArray[np.float64],
+    cone: NDArray[np.float64],
+) -> float:
+    """The light of lamp ``k`` at point ``p``, with nothing between."""
+    nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
+    if kind[k] == _SUN:
+        facing = -(nx * way[k, 0] + ny * way[k, 1] + nz * way[k, 2])
+        return float(power[k] * max(facing, 0.0))
+    x, y, z = place[k, 0] - point[p, 0], place[k, 1] - point[p, 1], place[k, 2] - point[p, 2]
+    facing = nx * x + ny * y + nz * z
+    if facing <= 0:
+        return 0.0
+    square = x * x + y * y + z * z
+    distance = np.sqrt(square)
+    along = -(way[k, 0] * x + way[k, 1] * y + way[k, 2] * z) / distance
+    if kind[k] == _BOTH:
+        along = abs(along)
+    if kind[k] >= _PATCH_KIND:
+        spread = area[k] * max(along, 0.0) / (square + area[k] / np.pi)
+    else:
+        spread = 1 / max(square, _NEAREST * _NEAREST)
+        if kind[k] == _SPOT:
+            edge = (along - cone[k, 1]) / max(cone[k, 0] - cone[k, 1], _SHARPEST)
+            edge = min(max(edge, 0.0), 1.0)
+            spread *= edge * edge
+    return float(power[k] * spread * facing / distance)

@@ -34,7 +34,7 @@ _ENOUGH = 0.5
 
 
 @dataclass(frozen=True)
-class Lit:
+class Lightmap:
     """A lightmap: (size, size) linear light, rows from the top, and the numbers of its texels that
     were computed, and that are read on faces."""
 
@@ -50,14 +50,14 @@ def bake(
     grain: float,
     sizes: tuple[int, ...],
     least: float = 0.0,
-) -> list[Lit]:
+) -> list[Lightmap]:
     """The lightmaps of (T, 3, 3) faces, whose light is ``look``.
 
     Neighbours that differ by more than ``grain`` stay apart; ``sizes`` ascend, each twice the one
     before; texels with less light than ``least`` take that of others nearby.
     """
     sizes = (sizes[0] // 2, *sizes)
-    result: list[Lit] = []
+    result: list[Lightmap] = []
     below: tuple[Singles, NDArray[np.int32], Bools] | None = None
     for size in sizes:
         centre = cover(atlas.uv, size)
@@ -66,19 +66,19 @@ def bake(
         value = np.zeros((size, size), np.float32)
         known = np.zeros((size, size), np.bool_)
         if below is not None:
-            value, known = _enlarged(*below, chart)
+            value, known = _enlarge(*below, chart)
         row, column = np.nonzero((owner >= 0) & ~known)
         face = owner[row, column].astype(np.int64)
         point = _positions(atlas.uv, corner, face, row, column, size)
         turn = (column * SPREAD[0] + row * SPREAD[1]) % 1.0
         value[row, column] = look(face, point, turn)
-        value[row, column] = smoothed(value, chart, row, column, np.float32(grain))
+        value[row, column] = smooth(value, chart, row, column, np.float32(grain))
         below = value, chart, centre >= 0
         if size > sizes[0]:
             read = owner >= 0
             light = read & (value >= least)
             filled = fill(value, light if light.any() else read)
-            result.append(Lit(filled, len(row), int(read.sum())))
+            result.append(Lightmap(filled, len(row), int(read.sum())))
     return result
 
 
@@ -90,9 +90,9 @@ def fill(value: Singles, known: Bools) -> Singles:
     # Even sides: a last row or column counts twice.
     grown = [(0, height % 2), (0, width % 2)]
     weight = np.pad(known, grown).astype(np.float32)
-    held = np.pad(np.where(known, value, 0), grown).astype(np.float32)
+    total_known = np.pad(np.where(known, value, 0), grown).astype(np.float32)
     count = weight.reshape(weight.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
-    total = held.reshape(held.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
+    total = total_known.reshape(total_known.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
     mean = np.divide(total, count, out=np.zeros_like(total), where=count > 0)
     coarse = fill(mean, count > 0)
     fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
@@ -110,7 +110,7 @@ def _positions(
     return np.asarray(np.einsum("nk,nkx->nx", share, corner[face]))
 
 
-def _enlarged(
+def _enlarge(
     value: Singles, chart: NDArray[np.int32], centred: Bools, larger: NDArray[np.int32]
 ) -> tuple[Singles, Bools]:
     """A lightmap of twice the size by bilinear filtering, and the texels in which it is valid:
@@ -119,11 +119,11 @@ def _enlarged(
     place = (np.arange(len(larger)) + 0.5) / 2 - 0.5
     first = np.clip(np.floor(place).astype(np.int64), 0, len(value) - 2)
     second = np.clip(place - first, 0, 1).astype(np.float32)
-    return interpolated(value, chart, centred, larger, first, np.stack([1 - second, second]))
+    return interpolate(value, chart, centred, larger, first, np.stack([1 - second, second]))
 
 
 @kernel
-def interpolated(
+def interpolate(
     value: Singles,
     chart: NDArray[np.int32],
     centred: Bools,
@@ -131,34 +131,34 @@ def interpolated(
     first: Ints,
     share: Singles,
 ) -> tuple[Singles, Bools]:
-    """See `_enlarged`; ``first``: (size,) the first of the two rows or columns for each of the
+    """See `_enlarge`; ``first``: (size,) the first of the two rows or columns for each of the
     larger lightmap, ``share``: (2, size) the shares of both."""
     size = len(larger)
     mean, believed = np.zeros((size, size), np.float32), np.zeros((size, size), np.bool_)
     for row in range(size):
         for column in range(size):
-            own, known = larger[row, column], False
+            own_chart, known = larger[row, column], False
             weight, total = np.float32(0), np.float32(0)
-            least, most = np.float32(np.inf), np.float32(-np.inf)
+            smallest, largest = np.float32(np.inf), np.float32(-np.inf)
             for i in range(2):
                 for j in range(2):
                     r, c = first[row] + i, first[column] + j
-                    if chart[r, c] != own:
+                    if chart[r, c] != own_chart:
                         continue
                     part = share[i, row] * share[j, column]
                     weight += part
                     total += part * value[r, c]
-                    least, most = min(least, value[r, c]), max(most, value[r, c])
+                    smallest, largest = min(smallest, value[r, c]), max(largest, value[r, c])
                     known |= centred[r, c]
             if weight > 0:
                 mean[row, column] = total / weight
-            agree = most - least <= np.float32(AGREE)
-            believed[row, column] = own >= 0 and weight >= _ENOUGH and known and agree
+            agree = largest - smallest <= np.float32(AGREE)
+            believed[row, column] = own_chart >= 0 and weight >= _ENOUGH and known and agree
     return mean, believed
 
 
 @kernel
-def smoothed(
+def smooth(
     value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints, grain: np.float32
 ) -> Singles:
     """(n,) the binomial mean of some texels and of those neighbours on the same chart that differ
@@ -166,14 +166,14 @@ def smoothed(
     height, width = value.shape
     result = np.empty(len(row), np.float32)
     for n in range(len(row)):
-        own, here = value[row[n], column[n]], chart[row[n], column[n]]
+        centre, centre_chart = value[row[n], column[n]], chart[row[n], column[n]]
         weight, total = np.float32(0), np.float32(0)
         for i in range(-1, 2):
             for j in range(-1, 2):
                 r, c = row[n] + i, column[n] + j
-                if not (0 <= r < height and 0 <= c < width) or chart[r, c] != here:
+                if not (0 <= r < height and 0 <= c < width) or chart[r, c] != centre_chart:
                     continue
-                if abs(value[r, c] - own) <= grain:
+                if abs(value[r, c] - centre) <= grain:
                     share = np.float32((2 - abs(i)) * (2 - abs(j)) / 16)
                     weight += share
                     total += share * value[r, c]
@@ -194,16 +194,16 @@ def vertex_light(look: Look, corner: Floats, normal: Floats) -> Floats:
     """(T, 3) light from 0 to 1 at the corners of (T, 3, 3) faces with (T, 3) normals; ``look`` is
     their light."""
     count = len(corner)
-    share = _inside()
+    share = _triangle_points()
     point = np.einsum("pk,tkx->tpx", share, corner).reshape(-1, 3)
     face = np.repeat(np.arange(count), POINTS)
     seen = look(face, point, turns(len(point))).reshape(count, POINTS)
-    vertex = _shared(corner, normal)
-    fitted = _fitted(vertex, share, seen, areas(corner))
+    vertex = _vertex_numbers(corner, normal)
+    fitted = _fit(vertex, share, seen, areas(corner))
     return np.clip(fitted[vertex], 0.0, 1.0)
 
 
-def _inside() -> Floats:
+def _triangle_points() -> Floats:
     """(POINTS, 3) barycentric coordinates spread over a triangle."""
     flat = hemisphere(POINTS).astype(np.float64)
     along = np.sqrt((np.arange(POINTS) + 0.5) / POINTS)
@@ -211,7 +211,7 @@ def _inside() -> Floats:
     return np.stack([1 - along, along * (1 - across), along * across], axis=1)
 
 
-def _shared(corner: Floats, normal: Floats) -> Ints:
+def _vertex_numbers(corner: Floats, normal: Floats) -> Ints:
     """(T, 3) a number for each corner, equal for corners in one place on nearly parallel faces."""
     place = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].ravel()
     facing = np.repeat(normal, 3, axis=0)
@@ -220,16 +220,16 @@ def _shared(corner: Floats, normal: Floats) -> Ints:
     given = 0
     for these in np.split(order, np.flatnonzero(np.diff(place[order])) + 1):
         first: list[tuple[Floats, int]] = []
-        for one in these.tolist():
-            known = next((n for way, n in first if way @ facing[one] >= SMOOTH), -1)
+        for place_row in these.tolist():
+            known = next((n for way, n in first if way @ facing[place_row] >= SMOOTH), -1)
             if known < 0:
                 known, given = given, given + 1
-                first.append((facing[one], known))
-            number[one] = known
+                first.append((facing[place_row], known))
+            number[place_row] = known
     return number.reshape(-1, 3)
 
 
-def _fitted(vertex: Ints, share: Floats, seen: Singles, area: Floats) -> Floats:
+def _fit(vertex: Ints, share: Floats, seen: Singles, area: Floats) -> Floats:
     """(V,) values at vertices whose interpolation is nearest to the light ``seen`` at the points of
     each face, by conjugate gradients on the normal equations."""
     count, weight = (

@@ -23,11 +23,11 @@ from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.cells.search import connected
 from ptmtools.errors import naming
 from ptmtools.light.occlusion import (
-    Surroundings,
-    escaping,
+    Occluders,
+    count_escapes,
     light,
+    move_outwards,
     normals,
-    outermost,
     points_on,
     spread_over,
     turns,
@@ -38,19 +38,21 @@ from ptmtools.tolerance import PARALLEL_COSINE
 #: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
 #: light from 0 to 1.
 Look = Callable[[Ints, Floats, Floats], Singles]
+#: Areas, m², and densities below this count as this.
+SMALLEST = 1e-9
 #: The grain of n rays is within this, divided by the root of n.
 _GRAIN = 0.8
 
 
 @dataclass(frozen=True)
-class Rays:
+class RayLight:
     """The light by rays of (T, 3, 3) faces, on their (T,) sides: 1 for the front, -1 for the back;
     see `light`.
 
     Faces up to ``error`` metres off the model's surface have its light; ``above``: see `light`.
     """
 
-    around: Surroundings
+    around: Occluders
     corner: Floats
     samples: int
     reach: float
@@ -71,7 +73,7 @@ class Rays:
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         normal = self.normal[face]
-        place = outermost(self.around, point, normal, self.error)
+        place = move_outwards(self.around, point, normal, self.error)
         return light(self.around, place, normal, turn, self.samples, self.reach, self.above)
 
 
@@ -104,7 +106,7 @@ def red_texels(data: bytes, limit: int, label: str) -> NDArray[np.uint8]:
 
 
 @dataclass(frozen=True)
-class Painted:
+class PaintedLight:
     """The light of a model's own lightmap.
 
     Attributes
@@ -129,14 +131,16 @@ class Painted:
     def density(self, face: Ints, area: Floats) -> float:
         """Texels to the metre of (n,) faces, on average over parts of these of (n,) m²; 0 for those
         without."""
-        of = self.source[face]
-        size = np.array([image.texels.size for image in self.images] + [0])[self.image[of]]
-        texels = size * plane_areas(self.uv[of]) / np.maximum(areas(self.corner[of]), 1e-9)
-        return math.sqrt(float((texels * area).sum() / max(area.sum(), 1e-9)))
+        source = self.source[face]
+        size = np.array([image.texels.size for image in self.images] + [0])[self.image[source]]
+        texels = (
+            size * plane_areas(self.uv[source]) / np.maximum(areas(self.corner[source]), SMALLEST)
+        )
+        return math.sqrt(float((texels * area).sum() / max(area.sum(), SMALLEST)))
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        of = self.source[face]
-        a, b, c = np.moveaxis(self.corner[of], 1, 0)
+        source = self.source[face]
+        a, b, c = np.moveaxis(self.corner[source], 1, 0)
         u, v, w = b - a, c - a, point - a
         uu, uv, vv = (np.einsum("nk,nk->n", p, q) for p, q in ((u, u), (u, v), (v, v)))
         wu, wv = (np.einsum("nk,nk->n", w, q) for q in (u, v))
@@ -145,11 +149,11 @@ class Painted:
         # A coarse face may lie beyond the face that it came from.
         share = np.clip(share, 0.0, 1.0)
         share /= np.maximum(share.sum(axis=1, keepdims=True), 1.0)
-        corners = self.uv[of]
+        corners = self.uv[source]
         at = corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0])
         at += share[:, 1:] * (corners[:, 2] - corners[:, 0])
         result = np.ones(len(point), np.float32)
-        index = self.image[of]
+        index = self.image[source]
         for number in np.unique(index[index >= 0]).tolist():
             image, these = self.images[number], index == number
             result[these] = 1 - image.strength * (1 - lookup(image, at[these]))
@@ -159,14 +163,14 @@ class Painted:
 def lookup(image: LightImage, at: Floats) -> Singles:
     """(n,) light of an image at (n, 2) coordinates from its lower left."""
     texels, (across, up) = image.texels, image.wrap
-    left, right, s = _between(at[:, 0], texels.shape[1], across)
-    above, below, t = _between(1 - at[:, 1], texels.shape[0], up)
-    upper = texels[above, left] * (1 - s) + texels[above, right] * s
-    lower = texels[below, left] * (1 - s) + texels[below, right] * s
+    first_column, second_column, s = _texel_pairs(at[:, 0], texels.shape[1], across)
+    upper_row, lower_row, t = _texel_pairs(1 - at[:, 1], texels.shape[0], up)
+    upper = texels[upper_row, first_column] * (1 - s) + texels[upper_row, second_column] * s
+    lower = texels[lower_row, first_column] * (1 - s) + texels[lower_row, second_column] * s
     return np.asarray((upper * (1 - t) + lower * t) / 255, np.float32)
 
 
-def _between(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, Floats]:
+def _texel_pairs(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, Floats]:
     """(n,) and (n,): the two of ``count`` texels in a row with coordinates between their centres,
     and (n,) the share of the second."""
     if wrap == "mirror":
@@ -189,7 +193,7 @@ _AT_AN_EDGE = 4
 
 
 def open_sides(
-    around: Surroundings, corner: Floats, both: Bools, reach: float, *, indoors: bool = False
+    around: Occluders, corner: Floats, both: Bools, reach: float, *, indoors: bool = False
 ) -> Floats:
     """(T,) -1 for faces of which the back counts, and 1 for all others.
 
@@ -216,7 +220,7 @@ def open_sides(
         for counts, side in ((front, 1.0), (back, -1.0)):
             way = side * sign[face, None] * normal[face]
             rays = around, point, way, turn, _WALKS
-            seen = escaping(*rays, _BOUNCES) if sky else light(*rays, reach)
+            seen = count_escapes(*rays, _BOUNCES) if sky else light(*rays, reach)
             counts[chosen] = seen.reshape(len(chosen), points).sum(axis=1)
 
     chosen = np.unique(plane[wanted])
@@ -228,10 +232,12 @@ def open_sides(
     return np.where(wanted, np.where((back > front)[plane], -sign, sign), 1.0)
 
 
-def planes(corner: Floats, normal: Floats, of: Bools, cosine: float = PARALLEL_COSINE) -> Ints:
+def planes(
+    corner: Floats, normal: Floats, followed: Bools, cosine: float = PARALLEL_COSINE
+) -> Ints:
     """(T,) for each of (T, 3, 3) faces the first face in its plane that edges connect with it, by
-    way of the faces ``of``, (T,). Faces whose (T, 3) normals have this dot product, of either sign,
-    count as of one plane."""
+    way of the (T,) ``followed`` faces. Faces whose (T, 3) normals have this dot product, of either
+    sign, count as of one plane."""
     count = len(corner)
     vertex = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     edge = np.sort(np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
@@ -239,9 +245,9 @@ def planes(corner: Floats, normal: Floats, of: Bools, cosine: float = PARALLEL_C
     edge, face = edge[order], order // 3
     pairs = [np.zeros((0, 2), np.int64)]
     for step in range(1, _AT_AN_EDGE):
-        one, other = face[:-step], face[step:]
-        alike = (edge[:-step] == edge[step:]).all(axis=1) & of[one] & of[other]
-        alike &= np.abs(np.einsum("nx,nx->n", normal[one], normal[other])) >= cosine
-        pairs.append(np.stack([one[alike], other[alike]], axis=1))
+        first, second = face[:-step], face[step:]
+        alike = (edge[:-step] == edge[step:]).all(axis=1) & followed[first] & followed[second]
+        alike &= np.abs(np.einsum("nx,nx->n", normal[first], normal[second])) >= cosine
+        pairs.append(np.stack([first[alike], second[alike]], axis=1))
     joined = np.concatenate(pairs)
     return connected(count, joined)

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints, Singles, areas
-from ptmtools.light.lamps import Lamps, direct, measured, near
-from ptmtools.light.looks import Rays
+from ptmtools.light.lamps import Lamps, direct_light, lamps_near, measure_lamps
+from ptmtools.light.looks import RayLight
 from ptmtools.light.occlusion import (
-    Surroundings,
+    Occluders,
     light_and_sky,
     normals,
     points_on,
@@ -29,7 +29,7 @@ from ptmtools.light.occlusion import (
 )
 
 if TYPE_CHECKING:
-    from ptmtools.light.cells import Piece
+    from ptmtools.light.model import CellSurfaces
     from ptmtools.light.options import LightOptions
 
 #: The usual share of rays that reach the sky beside a window.
@@ -47,12 +47,12 @@ _POINTS = 4096
 
 
 @dataclass(frozen=True)
-class Mix:
+class LightMix:
     """The light of a building besides ambient light.
 
     Attributes
     ----------
-    lamps: `measured`; None without any.
+    lamps: `measure_lamps`; None without any.
     sky: whether the sky is seen from some surface.
     slope: the part that shows of light above the knee.
     """
@@ -61,26 +61,26 @@ class Mix:
     sky: bool = False
     slope: float = 1.0
 
-    def look(self, rays: Rays) -> Mixed | Rays:
+    def look(self, rays: RayLight) -> MixedLight | RayLight:
         """The light of the faces of ``rays``."""
         if self.lamps is None and not self.sky:
             return rays
-        lamps = None if self.lamps is None else near(self.lamps, rays.corner)
-        return Mixed(rays, lamps, self)
+        lamps = None if self.lamps is None else lamps_near(self.lamps, rays.corner)
+        return MixedLight(rays, lamps, self)
 
-    def shown(self, total: Singles) -> Singles:
+    def tone(self, total: Singles) -> Singles:
         """(n,) all light as it shows."""
         above = np.maximum(total - _KNEE, 0)
         return np.asarray(total - (1 - self.slope) * above, np.float32)
 
 
 @dataclass(frozen=True)
-class Mixed:
+class MixedLight:
     """The light of the faces of ``rays``, and of the ``lamps`` that matter there."""
 
-    rays: Rays
+    rays: RayLight
     lamps: Lamps | None
-    mix: Mix
+    mix: LightMix
 
     @property
     def grain(self) -> float:
@@ -88,25 +88,27 @@ class Mixed:
         return self.rays.grain * (2 if self.mix.sky else 1)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        total = _sum(self.rays, self.lamps, self.mix.sky, (face, point, turn))[0]
-        return self.mix.shown(total)
+        total = _sum_light(self.rays, self.lamps, self.mix.sky, (face, point, turn))[0]
+        return self.mix.tone(total)
 
 
-def _sum(
-    rays: Rays, lamps: Lamps | None, sky: bool, places: tuple[Ints, Floats, Floats]
+def _sum_light(
+    rays: RayLight, lamps: Lamps | None, sky: bool, places: tuple[Ints, Floats, Floats]
 ) -> tuple[Singles, Singles]:
     """(n,) all light, and the share of rays that reach the sky, at places as of `Look`."""
+    # All of (n,) or (n, 3): ambient light and the share of rays that reach the sky come from the
+    # same rays. Where few reach it, more rays measure that share again. The sky and the lamps each
+    # add x / (1 + x), where x = 1 is their usual light.
     face, point, turn = places
-    normal, around = rays.normal[face], rays.around
-    of = around, point, normal, turn
-    ambient, seen = light_and_sky(*of, rays.samples, rays.reach, rays.above, sky=sky)
+    normal, around, samples, reach = rays.normal[face], rays.around, rays.samples, rays.reach
+    ambient, seen = light_and_sky(around, point, normal, turn, samples, reach, rays.above, sky=sky)
     few = np.flatnonzero((seen > 0) & (seen < SKY))
     if len(few):
-        finer = _FINER * rays.samples
-        seen[few] = light_and_sky(around, point[few], normal[few], turn[few], finer, rays.reach)[1]
+        again = point[few], normal[few], turn[few]
+        seen[few] = light_and_sky(around, *again, _FINER * samples, reach)[1]
     total = ambient + seen / (np.float32(SKY) + seen)
     if lamps is not None:
-        by_lamps = direct(around, lamps, point, normal, turn, shadow_rays(rays.samples))
+        by_lamps = direct_light(around, lamps, point, normal, turn, shadow_rays(samples))
         total = total + (by_lamps / (1 + by_lamps)).astype(np.float32)
     return total, seen
 
@@ -116,31 +118,35 @@ def shadow_rays(samples: int) -> int:
     return max(1, int(samples * _SHADOWS))
 
 
-def mixed(
-    around: Surroundings,
-    pieces: Sequence[Piece],
+def light_mix(
+    around: Occluders,
+    pieces: Sequence[CellSurfaces],
     lamps: Lamps,
     options: LightOptions,
     above: float,
     white: float,
-) -> Mix:
+) -> LightMix:
     """The light of a building of these pieces. ``above``: see `light`; ``white``: the light that
     shows as white."""
-    corner = np.concatenate([each.corner[~each.glass] for each in pieces]).astype(np.float64)
-    side = np.concatenate([each.side[~each.glass] for each in pieces])
+    corner = np.concatenate([surfaces.corner[~surfaces.glass] for surfaces in pieces]).astype(
+        np.float64
+    )
+    side = np.concatenate([surfaces.side[~surfaces.glass] for surfaces in pieces])
     area = areas(corner)
     if not area.sum() > 0:
-        return Mix()
+        return LightMix()
     face = spread_over(area, np.zeros(len(area), np.int64), np.array([0]), _POINTS)[0]
     point, turn = points_on(corner[face], np.arange(_POINTS)), turns(_POINTS)
     normal = normals(corner[face]) * np.where(side[face] < 0, -1.0, 1.0)[:, None]
-    own = measured(around, lamps, point, normal, turn, shadow_rays(options.light_samples))
-    some = own if len(own) else None
-    rays = Rays(around, corner, options.light_samples, options.light_reach,
+    measured_lamps = measure_lamps(
+        around, lamps, point, normal, turn, shadow_rays(options.light_samples)
+    )
+    some = measured_lamps if len(measured_lamps) else None
+    rays = RayLight(around, corner, options.light_samples, options.light_reach,
                 side=np.where(side < 0, -1.0, 1.0), above=above)  # fmt: skip
-    total, seen = _sum(rays, some, True, (face, point, turn))
+    total, seen = _sum_light(rays, some, True, (face, point, turn))
     if some is None and not seen.any():
-        return Mix()
+        return LightMix()
     bright = float(np.quantile(total.astype(np.float64), _BRIGHT))
     slope = (white - _KNEE) / max(bright - _KNEE, white - _KNEE)
-    return Mix(some, bool(seen.any()), slope)
+    return LightMix(some, bool(seen.any()), slope)

@@ -1,4 +1,4 @@
-"""The light of a building, as stored."""
+"""The surfaces of a cell, and the light of a building as stored."""
 
 from __future__ import annotations
 
@@ -8,8 +8,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools
+from ptmtools.arrays import Bools, Ints
 from ptmtools.store.archive import Stored
+
+
+@dataclass(frozen=True)
+class CellSurfaces:
+    """The surfaces of one cell.
+
+    Attributes
+    ----------
+    corner: (n, 3, 3) float32 metres.
+    object, shape: (n,) of the scene; of the cell, ascending.
+    glass: (n,) whether the surface has no light of its own: it is seen through, or glows.
+    dense: (n,) whether its light is at vertices.
+    side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
+    face: (n,) the triangle of the scene that it is a piece of.
+    """
+
+    corner: NDArray[np.float32]
+    object: Ints
+    shape: Ints
+    glass: Bools
+    dense: Bools
+    side: NDArray[np.int8]
+    face: Ints
 
 
 @dataclass(frozen=True)

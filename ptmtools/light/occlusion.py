@@ -34,7 +34,7 @@ _GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class Occluders:
     """The occluding surfaces.
 
     Attributes
@@ -52,10 +52,10 @@ class Surroundings:
     lift: float
 
     @staticmethod
-    def of(scene: Scene) -> Surroundings:
+    def from_scene(scene: Scene) -> Occluders:
         """The opaque faces of a scene."""
         low, high = scene.points.min(axis=0), scene.points.max(axis=0)
-        return Surroundings(
+        return Occluders(
             scene.points,
             scene.triangles[scene.opaque],
             (low + high) / 2,
@@ -76,25 +76,25 @@ class Surroundings:
     def free(self, origin: Floats, target: Floats) -> Bools:
         """(n,) whether nothing is between (n, 3) points and their targets, (n, 3), on surfaces."""
         way = target - origin
-        far = np.linalg.norm(way, axis=1)
+        distance = np.linalg.norm(way, axis=1)
         if self.tree is None:
-            return np.ones(len(far), np.bool_)
-        along = (way / np.maximum(far, np.finfo(float).tiny)[:, None]).astype(np.float32)
+            return np.ones(len(distance), np.bool_)
+        along = (way / np.maximum(distance, np.finfo(float).tiny)[:, None]).astype(np.float32)
         start = (origin - self.middle).astype(np.float32)
-        short = (far * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
+        short = (distance * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
         # A copy: Embree writes into its arguments.
         hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
         return np.asarray(hit >= short)
 
-    def upright(self, point: Floats, far: float, way: float) -> Floats:
+    def upright(self, point: Floats, height: float, way: float) -> Floats:
         """(n,) the heights of the first surfaces above (``way`` 1) or below (-1) (n, 3) points, at
-        most ``far`` away; the ground's where there is none."""
+        most ``height`` away; the ground's where there is none."""
         result = np.full(len(point), self.ground)
         if self.tree is None:
             return result
         along = np.zeros((len(point), 3), np.float32)
         along[:, 1] = way
-        limit = np.full(len(point), far + self.lift, np.float32)
+        limit = np.full(len(point), height + self.lift, np.float32)
         start = (point - self.middle).astype(np.float32)
         hit = self.tree.run(start, along, dists=limit.copy(), query="DISTANCE")
         blocked = hit < limit
@@ -102,7 +102,7 @@ class Surroundings:
         return result
 
 
-def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
+def move_outwards(around: Occluders, point: Floats, normal: Floats, within: float) -> Floats:
     """(n, 3) points moved to the outermost surface within ``within`` metres along their normals,
     before or behind them; unchanged without one.
 
@@ -113,13 +113,13 @@ def outermost(around: Surroundings, point: Floats, normal: Floats, within: float
     start = (point + within * normal - around.middle).astype(np.float32)
     limit = np.full(len(point), 2 * within, np.float32)
     back = (-normal).astype(np.float32)
-    far = around.tree.run(start, back, dists=limit.copy(), query="DISTANCE")
-    moved = np.where(far < limit, within - far.astype(np.float64), 0.0)
+    distance = around.tree.run(start, back, dists=limit.copy(), query="DISTANCE")
+    moved = np.where(distance < limit, within - distance.astype(np.float64), 0.0)
     return np.asarray(point + moved[:, None] * normal)
 
 
 def light(
-    around: Surroundings,
+    around: Occluders,
     point: Floats,
     normal: Floats,
     turn: Floats,
@@ -140,7 +140,7 @@ def light(
 
 
 def light_and_sky(
-    around: Surroundings,
+    around: Occluders,
     point: Floats,
     normal: Floats,
     turn: Floats,
@@ -155,7 +155,7 @@ def light_and_sky(
     result, open_share = np.empty(len(point), np.float32), np.zeros(len(point), np.float32)
     for part, origin, along in _fans(around, point, normal, turn, samples):
         start = origin.astype(np.float32)
-        share, unmet = _escaping(around, start, along, reach, math.inf if sky else reach)
+        share, unmet = _ray_light(around, start, along, reach, math.inf if sky else reach)
         if above:
             share *= (1 - above * (1 - along[:, 1]) / 2) / (1 - above / 6)
         result[part] = share.reshape(-1, samples).mean(axis=1)
@@ -165,7 +165,7 @@ def light_and_sky(
 
 
 def _fans(
-    around: Surroundings, point: Floats, normal: Floats, turn: Floats, samples: int
+    around: Occluders, point: Floats, normal: Floats, turn: Floats, samples: int
 ) -> Iterator[tuple[slice, Floats, Singles]]:
     """Runs of points, with the (k, 3) origins of the rays from these, relative to the middle of the
     scene, and their (k, 3) directions; see `light`."""
@@ -177,8 +177,8 @@ def _fans(
         yield part, np.repeat(lifted, samples, axis=0), along
 
 
-def escaping(
-    around: Surroundings,
+def count_escapes(
+    around: Occluders,
     point: Floats,
     normal: Floats,
     turn: Floats,
@@ -193,14 +193,14 @@ def escaping(
     for part, origin, along in _fans(around, point, normal, turn, samples):
         walk = np.arange(len(origin))
         for bounce in range(bounces + 1):
-            far, against = _met(around, origin, along)
-            out = np.isinf(far)
+            length, against = _first_hits(around, origin, along)
+            out = np.isinf(length)
             count[part] += np.bincount(walk[out] // samples, minlength=len(count[part]))
             if bounce == bounces or out.all():
                 break
             kept = ~out
             origin, walk, back = origin[kept], walk[kept], against[kept]
-            origin = origin + far[kept, None] * along[kept] + around.lift * back
+            origin = origin + length[kept, None] * along[kept] + around.lift * back
             ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
             turned = np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64)
             frames = _frames(back, turned)
@@ -208,23 +208,23 @@ def escaping(
     return count
 
 
-def _met(around: Surroundings, origin: Floats, along: Singles) -> tuple[Floats, Floats]:
+def _first_hits(around: Occluders, origin: Floats, along: Singles) -> tuple[Floats, Floats]:
     """(n,) lengths of rays whose origins are relative to the middle of the scene, inf to the sky;
     (n, 3) the normals of the surfaces that they meet, against them."""
     with np.errstate(divide="ignore", invalid="ignore"):
         down = (around.ground - around.middle[1] - origin[:, 1]) / along[:, 1]
-    far = np.where(along[:, 1] < 0, np.maximum(down, 0), np.inf)
-    against = np.zeros((len(far), 3))
+    length = np.where(along[:, 1] < 0, np.maximum(down, 0), np.inf)
+    against = np.zeros((len(length), 3))
     against[:, 1] = 1.0
     if around.tree is not None:
         hit = around.tree.run(origin.astype(np.float32), along.astype(np.float32), output=True)
-        nearer = (hit["primID"] >= 0) & (hit["tfar"] < far)
-        far[nearer] = hit["tfar"][nearer]
+        nearer = (hit["primID"] >= 0) & (hit["tfar"] < length)
+        length[nearer] = hit["tfar"][nearer]
         face = around.points[around.triangles[hit["primID"][nearer]]]
         way = normals(face)
         facing = np.einsum("nx,nx->n", way, along[nearer]) < 0
         against[nearer] = np.where(facing[:, None], way, -way)
-    return far, against
+    return length, against
 
 
 def hemisphere(samples: int) -> Singles:
@@ -268,22 +268,22 @@ def _frames(normal: Floats, turn: Floats) -> Singles:
     )
 
 
-def _escaping(
-    around: Surroundings, origin: Singles, along: Singles, reach: float, longest: float
+def _ray_light(
+    around: Occluders, origin: Singles, along: Singles, reach: float, longest: float
 ) -> tuple[Singles, Bools]:
     """(n,) the light of each ray, and (n,) whether it meets nothing within ``longest``, which is
     ``reach`` at least."""
-    far = np.full(len(origin), min(longest, np.finfo(np.float32).max), np.float32)
+    limit = np.full(len(origin), min(longest, np.finfo(np.float32).max), np.float32)
     with np.errstate(divide="ignore", invalid="ignore"):
         down = (np.float32(around.ground - around.middle[1]) - origin[:, 1]) / along[:, 1]
-    limit = np.where((along[:, 1] < 0) & (down < far), np.maximum(down, 0), far)
+    stop = np.where((along[:, 1] < 0) & (down < limit), np.maximum(down, 0), limit)
     if around.tree is not None:
         # A copy: Embree writes into its arguments.
-        limit = around.tree.run(origin, along, dists=limit.astype(np.float32), query="DISTANCE")
-    unmet = limit >= far
+        stop = around.tree.run(origin, along, dists=stop.astype(np.float32), query="DISTANCE")
+    unmet = stop >= limit
     if math.isinf(reach):
         return unmet.astype(np.float32), unmet
-    return np.minimum(limit / np.float32(reach), np.float32(1)), unmet
+    return np.minimum(stop / np.float32(reach), np.float32(1)), unmet
 
 
 #: Multiples of these modulo 1 are far apart in both directions (Roberts' R2 sequence).

@@ -39,13 +39,13 @@ class LightOptions:
     )
 
     def __post_init__(self) -> None:
-        for name, (least, most) in RANGES.items():
+        for name, (low, high) in RANGES.items():
             field, value = f"light_{name}", getattr(self, f"light_{name}")
-            if not least <= value <= most:
+            if not low <= value <= high:
                 raise InputError(
                     "PTM-I111",
                     f"--light-{name} {value:g} is not possible",
-                    remedy=f"use {least:g} to {most:g}",
+                    remedy=f"use {low:g} to {high:g}",
                 )
             used = ("auto", "bake") if name != "density" else ("auto", "bake", "model")
             if self.light not in used and value != getattr(type(self), field):

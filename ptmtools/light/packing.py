@@ -42,7 +42,7 @@ Mesh = tuple[Singles, NDArray[np.uint32]]
 
 
 @dataclass(frozen=True)
-class Packed:
+class PackedCharts:
     """An atlas.
 
     Attributes
@@ -58,7 +58,7 @@ class Packed:
     index: list[Ints]
 
 
-def pack(meshes: Sequence[Mesh], density: float, padding: int) -> Packed:
+def pack(meshes: Sequence[Mesh], density: float, padding: int) -> PackedCharts:
     """The atlas of some meshes, (V, 3) points and (T, 3) faces, that share no chart.
 
     density: texels to the unit of the points. padding: texels between charts beyond those that are
@@ -68,21 +68,21 @@ def pack(meshes: Sequence[Mesh], density: float, padding: int) -> Packed:
     in the last one.
     """
     points, faces = zip(*meshes, strict=True)
-    request = {**_joined("points", points), **_joined("faces", faces)}
+    request = {**_concatenate("points", points), **_concatenate("faces", faces)}
     request["options"] = np.array([density, padding], np.float64)
     reply = unpack_arrays(_ask(pack_arrays(request)), file="xatlas")
     width, height = reply["size"].tolist()
-    return Packed(width, height, _parted(reply, "uv"), _parted(reply, "index"))
+    return PackedCharts(width, height, _split(reply, "uv"), _split(reply, "index"))
 
 
-def _joined(name: str, arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _concatenate(name: str, arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Arrays as one: a message of many is slow."""
     rows = np.array([len(array) for array in arrays], np.int64)
     return {name: np.concatenate(arrays), f"{name}_rows": rows}
 
 
-def _parted(message: Mapping[str, NDArray[Any]], name: str) -> list[Any]:
-    """Inverse of `_joined`."""
+def _split(message: Mapping[str, NDArray[Any]], name: str) -> list[Any]:
+    """Inverse of `_concatenate`."""
     return np.split(message[name], np.cumsum(message[f"{name}_rows"])[:-1])
 
 
@@ -97,7 +97,7 @@ def _ask(request: bytes) -> bytes:
     with _asking:
         for _ in range(_ATTEMPTS):
             if _child is None or _child[0] != os.getpid():
-                _child = os.getpid(), _started()
+                _child = os.getpid(), _start()
             process, reply = _child[1], None
             assert process.stdin
             assert process.stdout
@@ -105,7 +105,7 @@ def _ask(request: bytes) -> bytes:
             try:
                 with watch, suppress(OSError):
                     _send(process.stdin, request)
-                    reply = _received(process.stdout)
+                    reply = _receive(process.stdout)
             finally:  # Ctrl-C, too: the next request must not get this reply
                 if reply is None or watch.expired:
                     _child = None
@@ -121,7 +121,7 @@ def _ask(request: bytes) -> bytes:
     )
 
 
-def _started() -> subprocess.Popen[bytes]:
+def _start() -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         **module_process("ptmtools.light.packing"),
         stdin=subprocess.PIPE,
@@ -136,7 +136,7 @@ def _send(stream: IO[bytes], message: bytes) -> None:
     stream.flush()
 
 
-def _received(stream: IO[bytes]) -> bytes | None:
+def _receive(stream: IO[bytes]) -> bytes | None:
     """The next message; None at the end of a stream."""
     head = stream.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
@@ -155,7 +155,7 @@ def _serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     requests, replies = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints is no reply
-    while (request := _received(requests)) is not None:
+    while (request := _receive(requests)) is not None:
         seconds = _SECONDS + _SECONDS_PER_BYTE * len(request)
         # These timers end the process even if no other thread of it can run.
         faulthandler.dump_traceback_later(seconds, exit=True)
@@ -170,9 +170,9 @@ def _reply(request: bytes) -> tuple[object, bytes]:
     """The atlas, which is destroyed with its last reference, and the reply."""
     import xatlas
 
-    held = unpack_arrays(request, file="request")
-    density, padding = held["options"].tolist()
-    meshes = list(zip(_parted(held, "points"), _parted(held, "faces"), strict=True))
+    message = unpack_arrays(request, file="request")
+    density, padding = message["options"].tolist()
+    meshes = list(zip(_split(message, "points"), _split(message, "faces"), strict=True))
     atlas: Any = xatlas.Atlas()
     for points, faces in meshes:
         atlas.add_mesh(points, faces)
@@ -181,7 +181,10 @@ def _reply(request: bytes) -> tuple[object, bytes]:
     packing.texels_per_unit = density
     atlas.generate(xatlas.ChartOptions(), packing)
     _, index, uv = zip(*(atlas.get_mesh(k) for k in range(len(meshes))), strict=True)
-    reply = {**_joined("uv", uv), **_joined("index", [each.astype(np.int64) for each in index])}
+    reply = {
+        **_concatenate("uv", uv),
+        **_concatenate("index", [corners.astype(np.int64) for corners in index]),
+    }
     reply["size"] = np.array([atlas.width, atlas.height], np.int64)
     return atlas, pack_arrays(reply)
 

@@ -93,39 +93,39 @@ def _indices(stream: NDArray[np.uint8], count: int) -> NDArray[np.uint32]:
     return out
 
 
-def _signed(elements: NDArray[np.uint8]) -> NDArray[np.signedinteger[Any]]:
+def _signed_view(elements: NDArray[np.uint8]) -> NDArray[np.signedinteger[Any]]:
     """(count, 4) the components of elements of 4 or 8 bytes."""
     return elements.view(np.int8 if elements.shape[1] == 4 else np.int16)
 
 
-def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _round(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """To the nearest integer, halves away from zero."""
     return np.trunc(values + np.copysign(0.5, values))
 
 
 def _octahedral(elements: NDArray[np.uint8]) -> NDArray[Any]:
     """Unit vectors of two components and the value that represents 1."""
-    stored = _signed(elements)
-    most = np.iinfo(stored.dtype).max
-    one = np.where(stored[:, 2] == 0, 1, stored[:, 2]).astype(np.float64)
-    x, y = stored[:, 0] / one, stored[:, 1] / one
+    stored = _signed_view(elements)
+    scale = np.iinfo(stored.dtype).max
+    unit = np.where(stored[:, 2] == 0, 1, stored[:, 2]).astype(np.float64)
+    x, y = stored[:, 0] / unit, stored[:, 1] / unit
     z = 1 - np.abs(x) - np.abs(y)
     below = np.minimum(z, 0)
     vector = np.stack([x - np.copysign(below, x), y - np.copysign(below, y), z], axis=1)
     vector /= np.maximum(np.linalg.norm(vector, axis=1), np.finfo(np.float64).tiny)[:, None]
     result = stored.copy()
-    result[:, :3] = _rounded(vector * most)
+    result[:, :3] = _round(vector * scale)
     return result
 
 
 def _quaternion(elements: NDArray[np.uint8]) -> NDArray[Any]:
     """Unit quaternions stored without their largest component."""
     stored = elements.view(np.int16)
-    one = (stored[:, 3] | 3).astype(np.float64)
-    rest = stored[:, :3] / one[:, None] / np.sqrt(2)
+    unit = (stored[:, 3] | 3).astype(np.float64)
+    rest = stored[:, :3] / unit[:, None] / np.sqrt(2)
     largest = np.sqrt(np.maximum(0, 1 - (rest**2).sum(axis=1)))
     result = np.empty_like(stored)
-    values = np.clip(_rounded(np.column_stack([largest, rest]) * 32767), -32768, 32767)
+    values = np.clip(_round(np.column_stack([largest, rest]) * 32767), -32768, 32767)
     place = ((stored[:, 3] & 3)[:, None] + np.arange(4)) % 4
     np.put_along_axis(result, place.astype(np.int64), values.astype(np.int16), axis=1)
     return result
@@ -140,7 +140,7 @@ def _exponential(elements: NDArray[np.uint8]) -> NDArray[Any]:
 
 def _color(elements: NDArray[np.uint8]) -> NDArray[Any]:
     """Red, green, blue and alpha from luma, two chrominances and alpha with a leading 1."""
-    stored = _signed(elements)
+    stored = _signed_view(elements)
     kind = np.dtype(f"u{stored.dtype.itemsize}")
     orange, green = stored[:, 1].astype(np.int64), stored[:, 2].astype(np.int64)
     luma, alpha = (stored[:, k].view(kind).astype(np.int64) for k in (0, 3))
@@ -149,8 +149,8 @@ def _color(elements: NDArray[np.uint8]) -> NDArray[Any]:
     alpha &= scale >> 1
     alpha = alpha << 1 | alpha & 1
     values = np.stack([luma + orange - green, luma + green, luma - orange - green, alpha], axis=1)
-    most = np.iinfo(kind).max
-    return np.clip(_rounded(values * (most / scale)[:, None]), 0, most).astype(kind)
+    largest = np.iinfo(kind).max
+    return np.clip(_round(values * (largest / scale)[:, None]), 0, largest).astype(kind)
 
 
 _Filter = Callable[[NDArray[np.uint8]], NDArray[Any]]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.jit import kernel, plain_kernel
+from ptmtools.jit import inlined_kernel, kernel, plain_kernel
 
 DONE = -1
 #: Largest number of elements of a block; elements of a group; largest size of a block in bytes.
@@ -32,11 +32,11 @@ def decode_attributes(data: _Bytes, end: int, version: int, stride: int, out: _B
     count, channels = len(out), stride // 4
     tail = len(data) - (stride + channels if version else stride)
     last = data[tail : tail + stride].copy()
-    most = min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK)
+    block = min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK)
     delta = np.zeros((4, BLOCK), dtype=np.uint8)
     at, first = 1, 0
     while first < count:
-        n = min(most, count - first)
+        n = min(block, count - first)
         control_at = at
         if version:
             at += channels
@@ -180,14 +180,9 @@ def decode_triangles(data: _Bytes, out: NDArray[np.uint32]) -> int:
             if low == 0 or low > 12:
                 _remember(vertex, c, state)
         else:
-            pair = int(np.int64(data[end + low]))
-            if low >= 14:
-                if state[4] >= end:
-                    return end
-                pair = int(np.int64(data[state[4]]))
-                state[4] += 1
-                if pair == 0:
-                    state[2] = 0
+            pair = _pair(data, end, low, state)
+            if pair < 0:
+                return end
             explicit_a = low == 15
             if explicit_a and not _explicit(data, end, state):
                 return end
@@ -195,16 +190,9 @@ def decode_triangles(data: _Bytes, out: NDArray[np.uint32]) -> int:
             b = c = 0
             for corner in range(2):
                 code = (pair >> 4) if corner == 0 else pair & 15
-                if code == 0:
-                    value = _next(state)
-                elif code < 15:
-                    if code > state[1]:
-                        return 1 + t
-                    value = int(np.int64(vertex[(state[1] - code) % _RECENT]))
-                elif low < 14 or not _explicit(data, end, state):
-                    return end
-                else:
-                    value = state[3]
+                value = _pair_corner(data, end, low, code, vertex, state)
+                if value < 0:
+                    return end if value == _NO_VALUE else 1 + t
                 if corner == 0:
                     b = value
                 else:
@@ -221,6 +209,48 @@ def decode_triangles(data: _Bytes, out: NDArray[np.uint32]) -> int:
         state[0] += 2
         out[3 * t], out[3 * t + 1], out[3 * t + 2] = a, b, c
     return DONE if state[4] == end else int(np.int64(state[4]))
+
+
+@inlined_kernel
+def _pair(data: _Bytes, end: int, low: int, state: NDArray[np.int64]) -> int:
+    """The codes of the second and third corners of a triangle without a recent edge: of the table
+    at the end of the data, or the next byte, where 0 begins again with the first vertex. -1 without
+    one."""
+    if low < 14:
+        return int(np.int64(data[end + low]))
+    if state[4] >= end:
+        return -1
+    pair = int(np.int64(data[state[4]]))
+    state[4] += 1
+    if pair == 0:
+        state[2] = 0
+    return pair
+
+
+#: No corner: the data end, or it refers to a vertex before the first.
+_NO_VALUE, _NO_VERTEX = -1, -2
+
+
+@inlined_kernel
+def _pair_corner(
+    data: _Bytes,
+    end: int,
+    low: int,
+    code: int,
+    vertex: NDArray[np.uint32],
+    state: NDArray[np.int64],
+) -> int:
+    """The corner that a code of a pair names: the next new vertex, a recent one, or an explicit
+    one."""
+    if code == 0:
+        return _next(state)
+    if code < 15:
+        if code > state[1]:
+            return _NO_VERTEX
+        return int(np.int64(vertex[(state[1] - code) % _RECENT]))
+    if low < 14 or not _explicit(data, end, state):
+        return _NO_VALUE
+    return int(state[3])
 
 
 @plain_kernel

@@ -2,7 +2,7 @@
 
 Implemented from the text of the extension (appendix A). Attributes are of version 0 and triangles
 of version 1, which every decoder of EXT_meshopt_compression reads; version 1 of attributes belongs
-to KHR_meshopt_compression. `reordered` gives the order of triangles and vertices that the codecs
+to KHR_meshopt_compression. `reorder` gives the order of triangles and vertices that the codecs
 are made for: neighbours one after the other, new vertices by number.
 """
 
@@ -72,7 +72,7 @@ def encode_triangles(triangle: NDArray[np.integer]) -> bytes:
     return head + out[:size].tobytes() + table.tobytes().ljust(_TABLE, b"\0")
 
 
-def reordered(triangle: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def reorder(triangle: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Reorders the triangles and vertices of a mesh.
 
     Each triangle shares one of the 15 latest edges, if any that is left does: the first of these in

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.jit import kernel, plain_kernel
+from ptmtools.jit import inlined_kernel, kernel, plain_kernel
 from ptmtools.meshopt.decoding_kernels import BLOCK, BLOCK_BYTES, GROUP
 
 _Bytes = NDArray[np.uint8]
@@ -27,11 +27,11 @@ def encode_attributes(element: _Bytes, modes: int, out: _Bytes) -> int:
     out: room for stride * (count + 16) * 5 / 4 bytes.
     """
     count, stride = element.shape
-    most = min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK)
+    block = min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK)
     delta = np.zeros(BLOCK, dtype=np.uint8)
     at = 0
-    for first in range(0, count, most):
-        n = min(most, count - first)
+    for first in range(0, count, block):
+        n = min(block, count - first)
         groups = (n + GROUP - 1) // GROUP
         for byte in range(stride):
             last = int(np.int64(element[max(first - 1, 0), byte]))
@@ -121,19 +121,7 @@ def encode_triangles(
                     turn = k
         a, b, c = corner[t, turn], corner[t, (turn + 1) % 3], corner[t, (turn + 2) % 3]
         if place >= 0:
-            code = _recent_vertex(c, vertex, state[1])
-            if not 1 <= code < _VERTICES:
-                if c == state[2]:
-                    code = 0
-                    state[2] += 1
-                elif abs(c - state[3]) == 1:
-                    code = 13 if c < state[3] else 14
-                    state[3] = c
-                else:
-                    code = 15
-                    _put_index(c, state, out)
-                _remember(vertex, c, state)
-            out[t] = place << 4 | code
+            out[t] = place << 4 | _third_code(c, vertex, state, out)
         else:
             is_next = a == state[2]
             if is_next:
@@ -144,9 +132,7 @@ def encode_triangles(
             listed = -1
             if is_next and code_b < 15 and code_c < 15:
                 frequency[pair] += 1
-                for k in range(len(table) - 1, -1, -1):
-                    if table[k] == pair:
-                        listed = k
+                listed = _table_place(pair, table)
             if listed >= 0:
                 out[t] = 0xF0 | listed
             else:
@@ -170,6 +156,35 @@ def encode_triangles(
         edge[(state[0] + 1) % _RECENT] = a, c
         state[0] += 2
     return int(state[4])
+
+
+@inlined_kernel
+def _third_code(c: int, vertex: NDArray[np.int64], state: NDArray[np.int64], out: _Bytes) -> int:
+    """The code of the third corner of a triangle with a recent edge: the next new vertex, a recent
+    one, a neighbour of the last explicit one, or an explicit one, which is written."""
+    code = _recent_vertex(c, vertex, state[1])
+    if 1 <= code < _VERTICES:
+        return code
+    if c == state[2]:
+        code = 0
+        state[2] += 1
+    elif abs(c - state[3]) == 1:
+        code = 13 if c < state[3] else 14
+        state[3] = c
+    else:
+        code = 15
+        _put_index(c, state, out)
+    _remember(vertex, c, state)
+    return code
+
+
+@inlined_kernel
+def _table_place(pair: int, table: _Bytes) -> int:
+    """The first place of a pair in a table, -1 for none."""
+    for k in range(len(table)):
+        if table[k] == pair:
+            return k
+    return -1
 
 
 @plain_kernel

@@ -40,7 +40,7 @@ from ptmtools.output.model import EmitReport, TextureRecord, VisitCost
 from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, mesh_path, path_of
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.viewpoints import place_viewpoints
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs, over_places
 
@@ -91,7 +91,7 @@ def write_files(
                 copy.unlink(missing_ok=True)
         return {name: len(data)}
 
-    return ordered(write, files, _WRITER_THREADS)
+    return map_in_order(write, files, _WRITER_THREADS)
 
 
 def visit_of(content: Content, sizes: Mapping[str, int]) -> VisitCost:

@@ -6,7 +6,7 @@ texture coordinates and coordinates in the lightmap or the normal map, or both, 
 of `ptmtools.output.grid`, stored as 24 bits and an exponent (filter EXPONENTIAL). Normals and
 tangents are a view of their own: they are those of charts, and take next to no bytes. Shapes lie in
 the order of their materials, the vertices and triangles of each in that of
-`ptmtools.meshopt.encoding.reordered`. Buffer 1 is the fallback of the extension: it has no data,
+`ptmtools.meshopt.encoding.reorder`. Buffer 1 is the fallback of the extension: it has no data,
 and the extension is required.
 
 Tried, in bytes for each triangle after gzip (museum, hospital, gallery, office), with a step of
@@ -35,7 +35,7 @@ from ptmtools.meshopt.encoding import (
     encode_attributes,
     encode_triangles,
     exponential,
-    reordered,
+    reorder,
 )
 from ptmtools.output.gltf_shapes import Sizes, Vertices, shortest
 from ptmtools.output.grid import texture_exponents
@@ -117,7 +117,7 @@ class CompressedBuffer:
         flat = (corner == np.roll(corner, 1, axis=1)).all(axis=2).any(axis=1)
         if flat.all():
             return None
-        used, triangle = reordered(place.ravel()[vertices.triangle[~flat]])
+        used, triangle = reorder(place.ravel()[vertices.triangle[~flat]])
         rows = first[used]
         color = None if vertices.color is None else vertices.color[rows]
         frame = None if vertices.frame is None else _steps(vertices.frame[rows], _FRAME)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
-from ptmtools.light.cells import Piece
+from ptmtools.light.model import CellSurfaces
 from ptmtools.light.occlusion import normals
 from ptmtools.output.mesh_levels import MANY
 
@@ -30,12 +30,12 @@ def pieces_of(
     glass: Bools,
     texel: float,
     replaced: NDArray[np.integer] | None = None,
-) -> list[Piece]:
+) -> list[CellSurfaces]:
     """The surfaces of each cell.
 
     Parameters
     ----------
-    glass: (materials,) whether a material has no light, see `Piece`.
+    glass: (materials,) whether a material has no light, see `CellSurfaces`.
     texel: metres of a lightmap.
     replaced: the objects with a relief. Their light is at vertices, as that of objects with
         thousands of small triangles.
@@ -52,7 +52,7 @@ def pieces_of(
     face = cells.triangle_source[geometry.piece]
     starts = geometry.triangle_start[geometry.cell_start]
     return [
-        Piece(
+        CellSurfaces(
             corner[a:b],
             number[a:b],
             shape[a:b] - geometry.cell_start[c],

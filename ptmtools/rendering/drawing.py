@@ -22,7 +22,7 @@ from ptmtools.options import option
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.light import as_bytes
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Caster, RayCamera
 
 #: Maximum side of a picture, pixels.
 MAX_SIDE = 4096
@@ -77,16 +77,16 @@ class ViewOptions:
         ):
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise _refused(
+                raise _option_error(
                     f"--{name.replace('_', '-')} {value:g} is not between {low} and {high}"
                 )
         if self.eye and self.viewpoint is not None:
-            raise _refused("--viewpoint and --eye exclude each other", "use one of them")
+            raise _option_error("--viewpoint and --eye exclude each other", "use one of them")
         for name, place in (("eye", self.eye), ("look", self.look)):
             if place and not all(map(math.isfinite, place)):
-                raise _refused(f"--{name} is not finite")
+                raise _option_error(f"--{name} is not finite")
         if self.eye and self.look and len(self.eye) > 3:
-            raise _refused("--look and a yaw of --eye exclude each other", "use one of them")
+            raise _option_error("--look and a yaw of --eye exclude each other", "use one of them")
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def eye_of(served: Served, options: ViewOptions) -> Eye:
         direction = np.array(options.look, dtype=np.float64) - position
     length = float(np.linalg.norm(direction))
     if length == 0:
-        raise _refused("--look is the position of the eye")
+        raise _option_error("--look is the position of the eye")
     return Eye(position, direction / length, math.radians(options.field_of_view or angle))
 
 
@@ -138,29 +138,29 @@ def draw_view(
     DatabaseError, LimitError: see `read_pyramids` and `read_octrees`.
     """
     from ptmtools.rendering.layers import Layers, blend, transparent_of
-    from ptmtools.rendering.light import lit
-    from ptmtools.rendering.painting import Painter
+    from ptmtools.rendering.light import with_lamp
+    from ptmtools.rendering.painting import SurfacePainter
 
     eye = eye_of(served, options)
     if options.lit:
-        served = lit(served)
+        served = with_lamp(served)
     surfaces = served.surfaces
     samples = _SAMPLES if options.width * options.height <= _MANY_PIXELS else 1
-    camera = Camera(
+    camera = RayCamera(
         options.width * samples,
         options.height * samples,
         eye.field_of_view,
         options.width / options.height,
         options.height,
     )
-    painter = Painter(served, max_side=options.max_side, lit=options.lit, progress=progress)
+    painter = SurfacePainter(served, max_side=options.max_side, lit=options.lit, progress=progress)
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, eye.position, eye.direction)
-    sight, layers = Layers(surfaces).before(sight, painter.alpha)
+    sight, layers = Layers(surfaces).split(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))
     shown = painter.colors(sight)
     blend(layers, sight, painter.colors, shown)
-    each = (options.height, samples, options.width, samples, 3)
-    return as_bytes(shown.reshape(each).mean(axis=(1, 3)))
+    grid = (options.height, samples, options.width, samples, 3)
+    return as_bytes(shown.reshape(grid).mean(axis=(1, 3)))
 
 
 def _vertical(degrees: float, options: ViewOptions) -> float:
@@ -171,5 +171,5 @@ def _vertical(degrees: float, options: ViewOptions) -> float:
     return 2 * math.degrees(math.atan(half))
 
 
-def _refused(problem: str, remedy: str | None = None) -> InputError:
+def _option_error(problem: str, remedy: str | None = None) -> InputError:
     return InputError("PTM-I111", problem, remedy=remedy)

@@ -8,6 +8,9 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints, cross
 from ptmtools.rendering.records import Sight, Triangles
 
+#: Takes the place of 0 for the component of a ray along the normal of a plane seen edge-on.
+_EDGE_ON = 1e-300
+
 
 def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats, Floats]:
     """For some pixels, which show a triangle: (n, 2) texture coordinates, and (n, 2, 2) their
@@ -18,8 +21,8 @@ def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats,
     uv = triangles.uv[triangle, 0] + np.einsum("ikj,ij->ik", gradient, at)
     slope = np.einsum("ij,kj->ik", normal, sight.axes) / facing[:, None]
     move = sight.axes[None] - slope[:, :, None] * ray[:, None]
-    each = np.einsum("ikj,icj->ikc", gradient, move)
-    return uv, each * (np.abs(depth) * sight.pixel)[:, None, None]
+    step = np.einsum("ikj,icj->ikc", gradient, move)
+    return uv, step * (np.abs(depth) * sight.pixel)[:, None, None]
 
 
 def detail_of_pixels(moves: Floats, width: int, height: int) -> Floats:
@@ -40,20 +43,20 @@ def show_colors(
     uneven = (vertex_colors != vertex_colors[:, :1]).any(axis=(1, 2))
     pixel = np.flatnonzero((sight.triangle >= 0) & uneven[sight.triangle])
     triangle = sight.triangle[pixel]
-    own = vertex_colors[triangle]
+    color = vertex_colors[triangle]
     corner, normal = triangles.corner[triangle], triangles.normal[triangle]
     _, _, at = _intersections(sight, pixel, triangles)
-    one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     whole = np.einsum("ij,ij->i", normal, normal)
     weight = np.zeros((len(pixel), 3))
-    for k, each in (1, (at, other)), (2, (one, at)):
-        part = np.einsum("ij,ij->i", cross(*each), normal)
+    for k, sides in (1, (at, second)), (2, (first, at)):
+        part = np.einsum("ij,ij->i", cross(*sides), normal)
         # One without area has the colour of its first corner.
         np.divide(part, whole, out=weight[:, k], where=whole > 0)
     np.clip(weight, 0, 1, out=weight)
     weight[:, 0] = 1 - weight[:, 1] - weight[:, 2]
-    here, mean = np.einsum("nk,nkj->nj", weight, own), own.mean(axis=1)
-    shown[pixel] *= np.divide(here, mean, out=np.zeros_like(here), where=mean > 0)
+    interpolated, mean = np.einsum("nk,nkj->nj", weight, color), color.mean(axis=1)
+    shown[pixel] *= np.divide(interpolated, mean, out=np.zeros_like(interpolated), where=mean > 0)
 
 
 def _intersections(
@@ -64,7 +67,7 @@ def _intersections(
     triangle, ray = sight.triangle[pixel], sight.ray[pixel]
     normal = triangles.normal[triangle]
     facing = np.einsum("ij,ij->i", normal, ray)
-    facing = np.where(facing == 0, 1e-300, facing)
+    facing = np.where(facing == 0, _EDGE_ON, facing)
     offset = triangles.corner[triangle, 0] - sight.eye
     depth = np.einsum("ij,ij->i", normal, offset) / facing
     return facing, depth, ray * depth[:, None] - offset

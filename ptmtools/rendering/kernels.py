@@ -14,11 +14,12 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import inlined_kernel, kernel, plain_kernel
-from ptmtools.rendering.lossy import Lossy
-from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles
+from ptmtools.rendering.records import Lossy, Pyramids, Shows, Sight, Triangles
 
 #: Colour of pixels without data, 0 to 255.
 GREY = 128.0
+#: A texture that moves by fewer texels from a pixel to the next is constant.
+_CONSTANT = 1e-30
 
 
 class Sums(NamedTuple):
@@ -43,7 +44,7 @@ class Sums(NamedTuple):
 
 
 @plain_kernel
-def wrapped(at: float, side: int) -> int:
+def wrap(at: float, side: int) -> int:
     """Wraps a whole number of texels into the side of a repeating texture."""
     if 0.0 <= at < side:  # the usual case, without a division
         return int(at)
@@ -51,7 +52,7 @@ def wrapped(at: float, side: int) -> int:
 
 
 @plain_kernel
-def around(at: float, side: int, clamped: bool) -> tuple[int, int, float]:
+def adjacent_texels(at: float, side: int, clamped: bool) -> tuple[int, int, float]:
     """Returns the two texels adjacent to a texture coordinate and the weight of the second."""
     place = at * side - 0.5
     low = np.floor(place)
@@ -59,7 +60,7 @@ def around(at: float, side: int, clamped: bool) -> tuple[int, int, float]:
         last = side - 1.0
         first, second = int(min(max(low, 0.0), last)), int(min(max(low + 1.0, 0.0), last))
     else:
-        first = wrapped(low, side)
+        first = wrap(low, side)
         second = first + 1 if first + 1 < side else 0
     return first, second, place - low
 
@@ -72,8 +73,8 @@ def sample(
     ``clamped`` (2,): see `Surfaces`."""
     texel, start = textures.texel, textures.start[t, level]
     width, height = textures.size[t, level, 0], textures.size[t, level, 1]
-    x0, x1, across = around(u, width, clamped[0])
-    y0, y1, down = around(v, height, clamped[1])
+    x0, x1, across = adjacent_texels(u, width, clamped[0])
+    y0, y1, down = adjacent_texels(v, height, clamped[1])
     a, b = start + (y0 * width + x0) * 3, start + (y0 * width + x1) * 3
     c, d = start + (y1 * width + x0) * 3, start + (y1 * width + x1) * 3
     for k in range(3):
@@ -120,7 +121,7 @@ def level_of_detail(
     if facing == 0.0:
         return 99.0
     depth = (normal[0] * offset[0] + normal[1] * offset[1] + normal[2] * offset[2]) / facing
-    most = 0.0
+    largest = 0.0
     for k in range(2):
         slope = (normal[0] * axes[k, 0] + normal[1] * axes[k, 1] + normal[2] * axes[k, 2]) / facing
         total = 0.0
@@ -129,9 +130,9 @@ def level_of_detail(
             for j in range(3):
                 move += gradient[c, j] * (axes[k, j] - ray[j] * slope)
             total += move * move
-        most = max(most, total)
-    covered = np.sqrt(most) * abs(depth) * pixel
-    return float(np.log2(covered)) if covered > 1e-30 else -99.0
+        largest = max(largest, total)
+    covered = np.sqrt(largest) * abs(depth) * pixel
+    return float(np.log2(covered)) if covered > _CONSTANT else -99.0
 
 
 @inlined_kernel
@@ -239,24 +240,46 @@ def add_frame(
             sums.need[p, n] += wanted
             if seen[i]:
                 sums.sight[p, n] += wanted
-        for q in range(lossy.first[t], lossy.first[t + 1]):
-            at, levels = lossy.state[q] + 2, lossy.pyramids.levels[q]
-            drawn = min(sharp + 1, levels)
-            for n in range(drawn):
-                sample(lossy.pyramids, q, n, u, v, clamped, shown[at + n])
-            if sharp < levels:
-                for k in range(3):
-                    step = shown[at + below, k] - shown[at + sharp, k]
-                    shown[at + sharp, k] += (detail - int(detail)) * step
-            for n in range(drawn):
-                for k in range(3):
-                    shown[at + n, k] *= color[k]
-                square = distance(shown[at + n], exact)
-                # Finer levels that are not sampled do not change the picture.
-                times = levels - n if n == drawn - 1 else 1
-                for m in range(n, n + times):
-                    sums.error[p, at + m] += np.sqrt(square)
-                    sums.square[p, at + m] += square
+        if lossy.first[t] < lossy.first[t + 1]:
+            _add_previews(lossy, sums, p, t, sharp, detail, u, v, clamped, color, exact, shown)
+
+
+@inlined_kernel
+def _add_previews(
+    lossy: Lossy,
+    sums: Sums,
+    p: int,
+    t: int,
+    sharp: int,
+    detail: float,
+    u: float,
+    v: float,
+    clamped: Bools,
+    color: Floats,
+    exact: Floats,
+    shown: Floats,
+) -> None:
+    """Adds the errors of a pixel in the states of the lossy previews of its texture ``t``, of which
+    ``sharp`` is the finest level that it samples."""
+    below = max(sharp - 1, 0)
+    for q in range(lossy.first[t], lossy.first[t + 1]):
+        at, levels = lossy.state[q] + 2, lossy.pyramids.levels[q]
+        drawn = min(sharp + 1, levels)
+        for n in range(drawn):
+            sample(lossy.pyramids, q, n, u, v, clamped, shown[at + n])
+        if sharp < levels:
+            for k in range(3):
+                step = shown[at + below, k] - shown[at + sharp, k]
+                shown[at + sharp, k] += (detail - int(detail)) * step
+        for n in range(drawn):
+            for k in range(3):
+                shown[at + n, k] *= color[k]
+            square = distance(shown[at + n], exact)
+            # Finer levels that are not sampled do not change the picture.
+            times = levels - n if n == drawn - 1 else 1
+            for m in range(n, n + times):
+                sums.error[p, at + m] += np.sqrt(square)
+                sums.square[p, at + m] += square
 
 
 @plain_kernel
@@ -342,12 +365,12 @@ def shade(
             pixel[:] = GREY
             continue
         t = triangles.texture[f]
-        held = column[t] if t >= 0 else 0
-        if held > 0:
-            textures, row = shows.pyramids, shows.row[t, held]
+        loaded_level = column[t] if t >= 0 else 0
+        if loaded_level > 0:
+            textures, row = shows.pyramids, shows.row[t, loaded_level]
             u, v, detail = texel_under(sight, i, triangles, textures, row, work)
             # The finest loaded level bounds the level of detail from below.
-            detail = max(detail, float(textures.levels[row] - shows.held[t, held]))
+            detail = max(detail, float(textures.levels[row] - shows.held[t, loaded_level]))
             blend(textures, row, detail, u, v, triangles.clamped[f], pixel, coarse)
         else:
             for k in range(3):

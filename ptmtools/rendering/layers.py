@@ -22,12 +22,15 @@ from ptmtools.embree import ray_tree
 from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
 from ptmtools.rendering.rays import Fronts
 from ptmtools.rendering.records import Sight
+from ptmtools.tolerance import GRAZING_COSINE, RAY_STEP_SHARE
 
 #: Most layers that a ray meets, those without effect included; it misses what follows, and shows
 #: the surface behind.
 MOST = 64
 #: Rays that are followed at a time.
 _BATCH = 1 << 18
+#: Least length of a normal, m²: a triangle without area has none.
+_FLAT = 1e-300
 
 #: (m,) alpha of the textures at the pixels of a sight, 0 to 1; (m, 3) colours of these.
 Alpha = Callable[[Sight], Floats]
@@ -62,17 +65,18 @@ class Layers:
         self._surfaces = surfaces
         self._one_sided = ~surfaces.two_sided[which]
         self._place, self._normal = corner[:, 0], normals(corner)
-        self._unit = 1 / np.maximum(np.linalg.norm(self._normal, axis=1), 1e-300)
+        self._unit = 1 / np.maximum(np.linalg.norm(self._normal, axis=1), _FLAT)
         self._all = surfaces.corner[:, 0], normals(surfaces.corner)
         # Not the middle of the box: one pane far away must not coarsen the coordinates of others.
         self._middle = np.median(corner.reshape(-1, 3), axis=0) if len(which) else np.zeros(3)
         #: (t,) from the plane of each to the origin of a ray behind it, metres: more than the
-        #: rounding of its corners in single precision.
-        self._step = 2e-6 * np.abs(corner - self._middle).max(axis=(1, 2), initial=0.5)
+        #: rounding of its corners in single precision. These reach as far as half a size.
+        reach = np.abs(corner - self._middle).max(axis=(1, 2), initial=0.5)
+        self._step = 2 * RAY_STEP_SHARE * reach
         self._tree: Any = ray_tree(corner - self._middle) if len(which) else None
         self._fronts = Fronts(surfaces, which, self._middle)
 
-    def before(self, sight: Sight, alpha: Alpha) -> tuple[Sight, list[Layer]]:
+    def split(self, sight: Sight, alpha: Alpha) -> tuple[Sight, list[Layer]]:
         """The sight with opaque texels of layers in place of the surfaces behind them, and the
         layers that blend, the first that each ray meets, the second, and so on."""
         layers: list[Layer] = []
@@ -82,8 +86,8 @@ class Layers:
         for begin in range(0, len(triangle), _BATCH):
             rows = slice(begin, begin + _BATCH)
             part = sight._replace(triangle=triangle[rows], ray=sight.ray[rows])
-            own = self._march(part, alpha)
-            layers += [each._replace(ray=each.ray + np.int32(begin)) for each in own]
+            part_layers = self._march(part, alpha)
+            layers += [layer._replace(ray=layer.ray + np.int32(begin)) for layer in part_layers]
         return sight._replace(triangle=triangle), layers
 
     def _march(self, sight: Sight, alpha: Alpha) -> list[Layer]:
@@ -95,7 +99,7 @@ class Layers:
         triangle, ray = sight.triangle, sight.ray
         end = np.full(len(ray), np.inf)
         hit = np.flatnonzero(triangle >= 0)
-        place, normal = (each[triangle[hit]] for each in self._all)
+        place, normal = (vectors[triangle[hit]] for vectors in self._all)
         end[hit] = _distance(sight.eye, ray[hit], place, normal)
         waiting, gone = np.arange(len(ray)), np.zeros(len(ray))
         for _ in range(MOST):
@@ -104,48 +108,52 @@ class Layers:
             pane = self._tree.run(*rays, query="INTERSECT")
             waiting, pane = waiting[pane >= 0], pane[pane >= 0]
             along, normal = ray[waiting], self._normal[pane]
-            far = _distance(sight.eye, along, self._place[pane], normal)
+            distance = _distance(sight.eye, along, self._place[pane], normal)
             turn = np.einsum("ij,ij->i", along, normal) * self._unit[pane]
             # A ray that grazes a plane needs longer for the same step away from it.
-            step = self._step[pane] / np.maximum(np.abs(turn), 1e-9)
-            before = far < end[waiting] - step
-            waiting, pane, far = waiting[before], pane[before], far[before]
+            step = self._step[pane] / np.maximum(np.abs(turn), GRAZING_COSINE)
+            before = distance < end[waiting] - step
+            waiting, pane, distance = waiting[before], pane[before], distance[before]
             turn, step = turn[before], step[before]
             if not len(waiting):
                 break
             met = self._which[pane]
             back = np.flatnonzero(self._one_sided[pane] & (turn > 0))
-            met[back] = self._front(sight.eye, ray[waiting[back]], far[back], step[back], met[back])
-            gone[waiting] = far + step
+            met[back] = self._front(
+                sight.eye, ray[waiting[back]], distance[back], step[back], met[back]
+            )
+            gone[waiting] = distance + step
             share = self._shares(sight, waiting, met, alpha)
             opaque, blends = share == 1, (share > 0) & (share < 1)
             triangle[waiting[opaque]] = met[opaque]
             if blends.any():
-                own = waiting[blends].astype(np.int32), met[blends].astype(np.int32)
-                layers.append(Layer(*own, share[blends].astype(np.float32)))
+                layer = waiting[blends].astype(np.int32), met[blends].astype(np.int32)
+                layers.append(Layer(*layer, share[blends].astype(np.float32)))
             waiting = waiting[~opaque]
         return layers
 
-    def _front(self, eye: Floats, along: Floats, far: Floats, step: Floats, back: Ints) -> Ints:
+    def _front(
+        self, eye: Floats, along: Floats, distance: Floats, step: Floats, back: Ints
+    ) -> Ints:
         """(m,) the triangles in front of the one-sided ones that rays meet from behind, -1 for
         none."""
         # From half a step before, so that it is not the front of the layer before.
-        start = eye - self._middle + along * (far - step / 2)[:, None]
-        return self._fronts.at(start, along, step, back)
+        start = eye - self._middle + along * (distance - step / 2)[:, None]
+        return self._fronts.first_hit(start, along, step, back)
 
     def _shares(self, sight: Sight, ray: Ints, met: Ints, alpha: Alpha) -> Floats:
         """(m,) the shares of triangles, 0 for -1, at the rays that meet them."""
         surfaces, share = self._surfaces, np.zeros(len(met))
         drawn = np.flatnonzero(met >= 0)
-        own = met[drawn]
-        share[drawn] = 1.0 if surfaces.opacity is None else surfaces.opacity[own]
-        textured = drawn[surfaces.texture[own] >= 0]
+        triangle = met[drawn]
+        share[drawn] = 1.0 if surfaces.opacity is None else surfaces.opacity[triangle]
+        textured = drawn[surfaces.texture[triangle] >= 0]
         if len(textured):
             shown = sight._replace(triangle=met[textured], ray=sight.ray[ray[textured]])
             share[textured] *= alpha(shown)
         cutoff = np.zeros(len(met))
         if surfaces.cutoff is not None:
-            cutoff[drawn] = surfaces.cutoff[own]
+            cutoff[drawn] = surfaces.cutoff[triangle]
         share[share < np.maximum(cutoff, LEAST_ALPHA)] = 0
         share[(share > 0) & (cutoff > 0)] = 1
         return share
@@ -156,13 +164,13 @@ def blend(layers: Sequence[Layer], sight: Sight, colors: Colors, shown: Floats) 
     time, the farthest first."""
     for ray, triangle, share in reversed(layers):
         part = share[:, None].astype(np.float64)
-        own = colors(sight._replace(triangle=triangle.astype(np.int64), ray=sight.ray[ray]))
-        shown[ray] = shown[ray] * (1 - part) + own * part
+        color = colors(sight._replace(triangle=triangle.astype(np.int64), ray=sight.ray[ray]))
+        shown[ray] = shown[ray] * (1 - part) + color * part
 
 
 def _distance(eye: Floats, along: Floats, place: Floats, normal: Floats) -> Floats:
     """(n,) distances to planes through (n, 3) places along (n, 3) rays from a point (3,)."""
     turn = np.einsum("ij,ij->i", along, normal)
     flat = np.where(turn == 0, 1.0, turn)
-    far = np.einsum("ij,ij->i", place - eye, normal) / flat
-    return np.asarray(np.where(turn == 0, np.inf, far))
+    distance = np.einsum("ij,ij->i", place - eye, normal) / flat
+    return np.asarray(np.where(turn == 0, np.inf, distance))

@@ -36,7 +36,7 @@ def light_on(normal: Floats) -> Floats:
     return result
 
 
-def lit(served: Served) -> Served:
+def with_lamp(served: Served) -> Served:
     """Returns the database with colours multiplied by the light of the lamp."""
     surfaces = served.surfaces
     color = surfaces.color * lamps(surfaces.corner)[:, None]

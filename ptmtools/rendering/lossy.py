@@ -8,44 +8,22 @@ columns of the exact levels, M of them; then come the columns of each lossy prev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ptmtools.arrays import Ints
 from ptmtools.output.model import offsets_of
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.previews import Texels, read_preview
-from ptmtools.rendering.pyramids import packed
-from ptmtools.rendering.records import Pyramids, Shows, own_levels
+from ptmtools.rendering.pyramids import pack_pyramids
+from ptmtools.rendering.records import Lossy, Pyramids, Shows, own_levels
 from ptmtools.texture.detail import with_offset
-
-
-class Lossy(NamedTuple):
-    """Pictures of the lossy previews of textures.
-
-    Attributes
-    ----------
-    pyramids: a pyramid for each of Q previews, texture by texture, by ascending level; their levels
-        are those of the texture, from the coarsest to that of the preview.
-    first: (T + 1,) where the previews of each texture begin.
-    state: (Q,) the state before the first one of each preview.
-    """
-
-    pyramids: Pyramids
-    first: Ints
-    state: Ints
-
-    @property
-    def states(self) -> int:
-        """The greatest number of a state of lossy previews, 0 without any."""
-        return int((self.state + self.pyramids.levels).max(initial=0))
 
 
 def no_previews(textures: int) -> Lossy:
     """The pictures of ``textures`` without previews."""
-    return Lossy(packed([]), np.zeros(textures + 1, np.int64), np.zeros(0, np.int64))
+    return Lossy(pack_pyramids([]), np.zeros(textures + 1, np.int64), np.zeros(0, np.int64))
 
 
 def states_of(texture: Mapping[str, Any]) -> list[int]:
@@ -70,10 +48,10 @@ def read_lossy(served: Served, progress: Progress = silent) -> Lossy:
         for number, before in enumerate(states_of(row)):
             if before:
                 levels = zip(read_preview(served, t, number), offsets_of(row), strict=False)
-                chains.append([with_offset(*each) for each in levels])
+                chains.append([with_offset(*level) for level in levels])
                 state.append(before)
         first.append(len(chains))
-    return Lossy(packed(chains), np.array(first), np.array(state, dtype=np.int64))
+    return Lossy(pack_pyramids(chains), np.array(first), np.array(state, dtype=np.int64))
 
 
 def pictures(pyramids: Pyramids, lossy: Lossy) -> Shows:
@@ -81,11 +59,11 @@ def pictures(pyramids: Pyramids, lossy: Lossy) -> Shows:
     if not len(lossy.state):
         return own_levels(pyramids)
     textures, columns = pyramids.start.shape
-    of = np.repeat(np.arange(textures), np.diff(lossy.first))
+    texture = np.repeat(np.arange(textures), np.diff(lossy.first))
     # All levels have their place, so that the level of detail is that of the whole texture.
-    start = np.zeros((len(of), columns), np.int64)
+    start = np.zeros((len(texture), columns), np.int64)
     start[:, : lossy.pyramids.start.shape[1]] = lossy.pyramids.start + len(pyramids.texel)
-    every = np.concatenate([np.arange(textures), of])
+    every = np.concatenate([np.arange(textures), texture])
     joined = Pyramids(
         np.concatenate([pyramids.texel, lossy.pyramids.texel]),
         np.concatenate([pyramids.start, start]),
@@ -96,10 +74,10 @@ def pictures(pyramids: Pyramids, lossy: Lossy) -> Shows:
     )
     states = max(lossy.states, int(pyramids.levels.max(initial=0))) + 1
     row = np.repeat(np.arange(textures)[:, None], states, axis=1)
-    held, last = np.minimum(np.arange(states), pyramids.levels[:, None]), pyramids.levels.copy()
-    for q, t in enumerate(of.tolist()):
+    finest, last = np.minimum(np.arange(states), pyramids.levels[:, None]), pyramids.levels.copy()
+    for q, t in enumerate(texture.tolist()):
         levels, before = int(lossy.pyramids.levels[q]), int(lossy.state[q])
-        own = slice(before + 1, before + levels + 1)
-        row[t, own], held[t, own] = textures + q, np.arange(1, levels + 1)
+        of_state = slice(before + 1, before + levels + 1)
+        row[t, of_state], finest[t, of_state] = textures + q, np.arange(1, levels + 1)
         last[t] = before + levels
-    return Shows(joined, row, held, last, pyramids.mean)
+    return Shows(joined, row, finest, last, pyramids.mean)

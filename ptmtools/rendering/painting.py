@@ -35,7 +35,7 @@ class ObjectPainter(Protocol):
         their faces; ``loaded`` (C,): the cells that are drawn."""
 
 
-class Painter:
+class SurfacePainter:
     """The surfaces of a database. Each texture is decoded once: by `alpha`, or by `load`, which
     comes after that and before `colors`."""
 
@@ -83,8 +83,8 @@ class Painter:
         if self._surfaces.bumps:
             maps.append(self._surfaces.bumps.number)
         used: set[int] = set()
-        for each in triangles:
-            hit = np.unique(each[each >= 0])
+        for numbers in triangles:
+            hit = np.unique(numbers[numbers >= 0])
             used.update(*(number[hit].tolist() for number in maps))
         pyramids = read_pyramids(self._served, self._progress, used, self._decoded)
         self._decoded.clear()

@@ -31,19 +31,19 @@ def read_preview(served: Served, texture: int, number: int, *, alpha: bool = Fal
     preview = row["previews"][number]
     file = served.file(preview["file"])
     sizes = sizes_of(row)[: preview["level"] + 1]
-    levels = build_pyramid(_decoded(file, served.read(preview["file"]), 3 + alpha))[-len(sizes) :]
+    levels = build_pyramid(_decode(file, served.read(preview["file"]), 3 + alpha))[-len(sizes) :]
     if [level.shape[1::-1] for level in levels] != sizes:
-        raise _damaged(file, "does not match the index")
+        raise _damage_error(file, "does not match the index")
     return [np.ascontiguousarray(level) for level in levels]
 
 
-def _decoded(file: Path, data: bytes, components: int) -> Texels:
+def _decode(file: Path, data: bytes, components: int) -> Texels:
     """(h, w, components) the texels of an image."""
     try:
         return decode_preview(data, components)
     except (OSError, ValueError, SyntaxError) as fault:
-        raise _damaged(file, f"cannot be decoded ({fault})") from None
+        raise _damage_error(file, f"cannot be decoded ({fault})") from None
 
 
-def _damaged(file: Path, problem: str) -> DatabaseError:
+def _damage_error(file: Path, problem: str) -> DatabaseError:
     return DatabaseError("PTM-D006", problem, file=file, remedy=BUILD)

@@ -46,10 +46,10 @@ def read_pyramids(
         for below, level in pairwise(chains[t]):
             texels = level.shape[0] * level.shape[1]
             differences[t].append(difference_between(level, below) / texels)
-        each = zip(chains[t], offsets_of(rows[t]), strict=True)
-        chains[t] = [with_offset(level, offset) for level, offset in each]
+        pairs = zip(chains[t], offsets_of(rows[t]), strict=True)
+        chains[t] = [with_offset(level, offset) for level, offset in pairs]
         mean[t] = chains[t][0].reshape(-1, 3).mean(axis=0)
-    result = packed(chains)
+    result = pack_pyramids(chains)
     for row, values in zip(result.differences, differences, strict=True):
         row[: len(values)] = values
     return result._replace(mean=mean)
@@ -78,25 +78,25 @@ def read_levels(served: Served, texture: int) -> list[Texels]:
 def _levels(served: Served, texture: int) -> list[Texels]:
     row, file = served.index["textures"][texture], served.texture_file(texture)
     with reader.open(file, limits=_LIMITS) as ptm:
-        held = [level.end for level in ptm.header.levels[: ptm.whole]]
+        ends = [level.end for level in ptm.header.levels[: ptm.whole]]
         finest = ptm.header.levels[-1]
-        if (held, finest.width, finest.height) != (row["ends"], row["width"], row["height"]):
+        if (ends, finest.width, finest.height) != (row["ends"], row["width"], row["height"]):
             raise DatabaseError(
                 "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
             )
         levels = [in_colors(samples) for samples in ptm.levels()]
         alpha = ptm.header.components in (2, 4)
-    if (count := len(sizes_of(row))) > len(held):
-        levels += read_preview(served, texture, -1, alpha=alpha)[len(held) : count]
+    if (count := len(sizes_of(row))) > len(ends):
+        levels += read_preview(served, texture, -1, alpha=alpha)[len(ends) : count]
     return levels
 
 
 def alpha_of(levels: Sequence[Texels]) -> Pyramids:
     """The alpha of the (h, w, 4) levels of a texture, as the colours of another."""
-    return packed([[np.repeat(level[..., 3:], 3, axis=2) for level in levels]])
+    return pack_pyramids([[np.repeat(level[..., 3:], 3, axis=2) for level in levels]])
 
 
-def packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
+def pack_pyramids(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
     """Packs textures of (h, w, 3) levels, the coarsest first, without means and differences.
 
     Empties each list after copying it, to limit peak memory.

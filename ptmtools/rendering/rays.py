@@ -16,6 +16,7 @@ from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.embree import ray_tree
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.records import Sight
+from ptmtools.tolerance import RAY_STEP_SHARE
 
 #: Lines of the target screen.
 LINES = 1080
@@ -26,7 +27,7 @@ _MAX_HITS = 16
 
 
 @dataclass(frozen=True)
-class Camera:
+class RayCamera:
     """A pinhole camera with Y up.
 
     Attributes
@@ -91,13 +92,13 @@ class Caster:
         low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
         self._middle = (low + high) / 2
         #: Offset of a ray's new origin behind a surface that it passed through, metres.
-        self._step = 1e-6 * max(1.0, float((high - low).max()))
+        self._step = RAY_STEP_SHARE * max(1.0, float((high - low).max()))
         self._tree: Any = None
         if len(self._which):
             self._tree = ray_tree(corner[self._which] - self._middle)
         self._fronts = Fronts(surfaces, self._which, self._middle)
 
-    def look(self, camera: Camera, eye: Floats, direction: Floats) -> Sight:
+    def look(self, camera: RayCamera, eye: Floats, direction: Floats) -> Sight:
         """Casts all rays of a camera from an eye (3,) in a direction (3,)."""
         rays, axes = camera.rays(direction[None])
         ray = rays.reshape(-1, 3)
@@ -125,10 +126,10 @@ class Caster:
             if not len(waiting):
                 break
             to = self._corner[triangle, 0] - self._middle - start[waiting]
-            far = np.maximum(np.einsum("ij,ij->i", to, self._normal[triangle]) / turn, 0)
+            distance = np.maximum(np.einsum("ij,ij->i", to, self._normal[triangle]) / turn, 0)
             step = self._step / np.linalg.norm(along[waiting], axis=1)
-            start[waiting] += along[waiting] * (far - step)[:, None]
-            met = self._fronts.at(start[waiting], along[waiting], 2 * step, triangle)
+            start[waiting] += along[waiting] * (distance - step)[:, None]
+            met = self._fronts.first_hit(start[waiting], along[waiting], 2 * step, triangle)
             result[waiting] = met
             start[waiting] += along[waiting] * (2 * step)[:, None]
             waiting = waiting[met < 0]
@@ -149,10 +150,10 @@ class Fronts:
         #: Trees of the faces that may coincide with the back of one of a `_way`.
         self._others: dict[int, tuple[Any, Ints]] = {}
 
-    def at(self, start: Floats, along: Floats, far: Floats, back: Ints) -> Ints:
+    def first_hit(self, start: Floats, along: Floats, length: Floats, back: Ints) -> Ints:
         """(n,) the visible triangle in the place of each of ``back``, -1 for none.
 
-        start, along: (n, 3) of the rays, from the middle; far: (n,) their ends.
+        start, along: (n, 3) of the rays, from the middle; length: (n,) of them.
         """
         result, ways = np.full(len(start), -1, np.int64), self._way[back]
         for way in np.unique(ways).tolist():
@@ -165,7 +166,7 @@ class Fronts:
             if tree is None:
                 continue
             ray = start[rows].astype(np.float32), along[rows].astype(np.float32)
-            hit = tree.run(*ray, dists=far[rows].astype(np.float32), query="INTERSECT")
+            hit = tree.run(*ray, dists=length[rows].astype(np.float32), query="INTERSECT")
             rows, triangle = rows[hit >= 0], which[hit[hit >= 0]]
             turn = np.einsum("ij,ij->i", self._normal[triangle], along[rows])
             faced = ~self._one_sided[triangle] | (turn <= 0)
@@ -209,8 +210,8 @@ class Frustum:
         """(n,) whether each box may meet the frustum; conservative near its corners."""
         normal = self._planes
         # Corner of each box farthest along each normal.
-        far = np.where(normal[:, None] > 0, high[None], low[None]) - self.eye
-        inside: Bools = (np.einsum("pij,pj->pi", far, normal) > 0).all(axis=0)
+        farthest = np.where(normal[:, None] > 0, high[None], low[None]) - self.eye
+        inside: Bools = (np.einsum("pij,pj->pi", farthest, normal) > 0).all(axis=0)
         return inside
 
     def meets_hull(self, points: Floats) -> bool:
@@ -223,7 +224,7 @@ class Frustum:
         outside = np.maximum(np.maximum(low - self.eye, self.eye - high), 0)
         return np.asarray(np.linalg.norm(outside, axis=1))
 
-    def covered(self, low: Floats, high: Floats) -> Floats:
+    def covered_shares(self, low: Floats, high: Floats) -> Floats:
         """(n,) share of the screen covered by the bounding rectangle of each projected box; 1 if
         the box reaches behind the camera."""
         right, up = self._axes

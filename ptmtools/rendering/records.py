@@ -34,6 +34,27 @@ class Pyramids(NamedTuple):
     differences: Floats
 
 
+class Lossy(NamedTuple):
+    """Pictures of the lossy previews of textures.
+
+    Attributes
+    ----------
+    pyramids: a pyramid for each of Q previews, texture by texture, by ascending level; their levels
+        are those of the texture, from the coarsest to that of the preview.
+    first: (T + 1,) where the previews of each texture begin.
+    state: (Q,) the state before the first one of each preview.
+    """
+
+    pyramids: Pyramids
+    first: Ints
+    state: Ints
+
+    @property
+    def states(self) -> int:
+        """The greatest number of a state of lossy previews, 0 without any."""
+        return int((self.state + self.pyramids.levels).max(initial=0))
+
+
 class Shows(NamedTuple):
     """Pictures of the columns of textures (`Catalogue`): each the coarsest levels of a pyramid.
 
@@ -55,9 +76,9 @@ class Shows(NamedTuple):
 def own_levels(pyramids: Pyramids) -> Shows:
     """Returns the columns of textures with one pyramid each: its levels."""
     shape = pyramids.start.shape[0], pyramids.start.shape[1] + 1
-    held = np.minimum(np.arange(shape[1]), pyramids.levels[:, None])
+    finest = np.minimum(np.arange(shape[1]), pyramids.levels[:, None])
     row = np.repeat(np.arange(shape[0])[:, None], shape[1], axis=1)
-    return Shows(pyramids, row, held, pyramids.levels, pyramids.mean)
+    return Shows(pyramids, row, finest, pyramids.levels, pyramids.mean)
 
 
 class Triangles(NamedTuple):

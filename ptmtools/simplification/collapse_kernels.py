@@ -32,8 +32,8 @@ from ptmtools.simplification.state_kernels import (
     MARKS,
     REJECTIONS,
     TOPOLOGY,
+    CollapseState,
     Heap,
-    State,
     copy_entry,
     drop_stale,
     faces_of_edge,
@@ -61,7 +61,9 @@ OPTIMUM_MARGIN = ROUNDING_SHARE
 
 
 @kernel
-def half_edge_cost(state: State, a: int, b: int, count: int, x: float, y: float, z: float) -> float:
+def half_edge_cost(
+    state: CollapseState, a: int, b: int, count: int, x: float, y: float, z: float
+) -> float:
     """Returns the cost of the half-edge collapse of vertex a into b, where (x, y, z) is b - a.
 
     The first ``count`` rows of ``state.shared`` hold the faces at the edge, seen from a.
@@ -81,7 +83,7 @@ def half_edge_cost(state: State, a: int, b: int, count: int, x: float, y: float,
 
 
 @kernel
-def cheapest_target(state: State, a: int, b: int, rejected: int) -> int:
+def cheapest_target(state: CollapseState, a: int, b: int, rejected: int) -> int:
     """Returns the cheapest target of an edge, a < b, whose bit is not set in ``rejected``.
 
     Writes the cost of the collapse and its key in the heap to ``state.edge_cost``, and for
@@ -124,7 +126,7 @@ def cheapest_target(state: State, a: int, b: int, rejected: int) -> int:
 
 
 @kernel
-def push(state: State, heap: Heap, a: int, b: int, rejected: int) -> None:
+def push(state: CollapseState, heap: Heap, a: int, b: int, rejected: int) -> None:
     """Pushes an edge onto the heap, unless ``rejected`` covers all its targets."""
     if a > b:
         a, b = b, a
@@ -138,7 +140,9 @@ def push(state: State, heap: Heap, a: int, b: int, rejected: int) -> None:
 
 
 @kernel
-def append_entry(state: State, heap: Heap, a: int, b: int, rejected: int, cost: float) -> None:
+def append_entry(
+    state: CollapseState, heap: Heap, a: int, b: int, rejected: int, cost: float
+) -> None:
     """Appends an entry to the heap without restoring its order."""
     at = state.counters[ENTRIES]
     heap.cost[at] = cost
@@ -150,7 +154,7 @@ def append_entry(state: State, heap: Heap, a: int, b: int, rejected: int, cost: 
 
 
 @kernel
-def fill_heap(state: State, heap: Heap) -> None:
+def fill_heap(state: CollapseState, heap: Heap) -> None:
     """Rebuilds the heap from all edges and resets the number of rejections."""
     triangle = state.triangle
     state.counters[ENTRIES] = state.counters[REJECTIONS] = 0
@@ -170,7 +174,7 @@ def fill_heap(state: State, heap: Heap) -> None:
 
 
 @kernel
-def propagate_constraints(state: State, v: int, count: int) -> None:
+def propagate_constraints(state: CollapseState, v: int, count: int) -> None:
     """Sets the constraint bit of edges of v onto which a collapse moved a constrained edge."""
     triangle, constraint, shared = state.triangle, state.constraint, state.shared
     for i in range(count):
@@ -187,7 +191,7 @@ def propagate_constraints(state: State, v: int, count: int) -> None:
 
 
 @kernel
-def remove_opposite_faces(state: State, v: int) -> None:
+def remove_opposite_faces(state: CollapseState, v: int) -> None:
     """Removes pairs of faces of v that coincide with opposite orientation."""
     triangle = state.triangle
     corner = state.head[v]
@@ -197,10 +201,10 @@ def remove_opposite_faces(state: State, v: int) -> None:
         if triangle[t, 0] < 0:
             continue
         x, y = triangle[t, (k + 1) % 3], triangle[t, (k + 2) % 3]
-        other = corner
-        while other >= 0:
-            s, j = other // 3, other % 3
-            other = state.next_corner[other]
+        candidate = corner
+        while candidate >= 0:
+            s, j = candidate // 3, candidate % 3
+            candidate = state.next_corner[candidate]
             alive = triangle[s, 0] >= 0
             if alive and triangle[s, (j + 1) % 3] == y and triangle[s, (j + 2) % 3] == x:
                 triangle[t, 0] = triangle[s, 0] = -1
@@ -209,7 +213,9 @@ def remove_opposite_faces(state: State, v: int) -> None:
 
 
 @kernel
-def collapse(state: State, u: int, v: int, count: int, px: float, py: float, pz: float) -> None:
+def collapse(
+    state: CollapseState, u: int, v: int, count: int, px: float, py: float, pz: float
+) -> None:
     """Collapses u into v and moves v to (px, py, pz).
 
     The first ``count`` rows of ``state.shared`` hold the faces at the edge, seen from u.
@@ -257,7 +263,7 @@ def collapse(state: State, u: int, v: int, count: int, px: float, py: float, pz:
 
 
 @kernel
-def push_edges_of(state: State, heap: Heap, v: int) -> None:
+def push_edges_of(state: CollapseState, heap: Heap, v: int) -> None:
     """Pushes each edge of a vertex onto the heap once."""
     triangle, mark = state.triangle, state.mark
     visited = state.counters[MARKS] + 1
@@ -267,15 +273,15 @@ def push_edges_of(state: State, heap: Heap, v: int) -> None:
     while corner >= 0:
         t = corner // 3
         for k in range(3):
-            other = triangle[t, k]
-            if mark[other] != visited:
-                mark[other] = visited
-                push(state, heap, v, other, 0)
+            neighbour = triangle[t, k]
+            if mark[neighbour] != visited:
+                mark[neighbour] = visited
+                push(state, heap, v, neighbour, 0)
         corner = state.next_corner[corner]
 
 
 @kernel
-def collapse_edges(state: State, heap: Heap, faces: int) -> None:
+def collapse_edges(state: CollapseState, heap: Heap, faces: int) -> None:
     """Collapses edges in ascending order of cost until ``faces`` faces are left or the heap is
     empty."""
     counters, version = state.counters, state.version

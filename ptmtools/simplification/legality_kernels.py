@@ -9,7 +9,7 @@ degenerate, or if a wedge of the removed vertex has no counterpart at the remain
 from __future__ import annotations
 
 from ptmtools.jit import plain_kernel as kernel
-from ptmtools.simplification.state_kernels import DROP_PARTS, FACES, MARKS, TOPOLOGY, State
+from ptmtools.simplification.state_kernels import DROP_PARTS, FACES, MARKS, TOPOLOGY, CollapseState
 from ptmtools.tolerance import FILE_SHARE
 
 #: A face is degenerate if its height is less than this share of its longest side.
@@ -21,7 +21,7 @@ STRICT_LIMITS, RELAXED_LIMITS = (0.5, 0.95, 0.05), (0.2, 0.2, 0.0)
 
 
 @kernel
-def mark_neighbours(state: State, u: int, v: int) -> int:
+def mark_neighbours(state: CollapseState, u: int, v: int) -> int:
     """Marks the vertices of the faces of v, except u and v, and returns the new mark."""
     neighbour, corner = state.counters[MARKS] + 1, state.head[v]
     state.counters[MARKS] = neighbour
@@ -34,7 +34,7 @@ def mark_neighbours(state: State, u: int, v: int) -> int:
 
 
 @kernel
-def satisfies_link_condition(state: State, u: int, v: int, count: int) -> bool:
+def satisfies_link_condition(state: CollapseState, u: int, v: int, count: int) -> bool:
     """Tests the link condition of an edge whose faces are the first ``count`` rows of ``shared``.
 
     False also if a line of constrained edges would end or touch itself.
@@ -65,19 +65,19 @@ def satisfies_link_condition(state: State, u: int, v: int, count: int) -> bool:
         t, k = corner // 3, corner % 3
         x, y = triangle[t, (k + 1) % 3], triangle[t, (k + 2) % 3]
         if mark[x] == common and mark[y] == common:
-            other = state.head[v]
-            while other >= 0:
-                s, j = other // 3, other % 3
+            candidate = state.head[v]
+            while candidate >= 0:
+                s, j = candidate // 3, candidate % 3
                 p, q = triangle[s, (j + 1) % 3], triangle[s, (j + 2) % 3]
                 if (p == x and q == y) or (p == y and q == x):
                     return False
-                other = state.next_corner[other]
+                candidate = state.next_corner[candidate]
         corner = state.next_corner[corner]
     return True
 
 
 @kernel
-def valence(state: State, v: int) -> int:
+def valence(state: CollapseState, v: int) -> int:
     """Returns the number of faces of a vertex."""
     result, corner = 0, state.head[v]
     while corner >= 0:
@@ -87,7 +87,7 @@ def valence(state: State, v: int) -> int:
 
 
 @kernel
-def is_isolated_face(state: State, u: int, v: int, count: int) -> bool:
+def is_isolated_face(state: CollapseState, u: int, v: int, count: int) -> bool:
     """Whether the face at an edge is the only face of each of its vertices."""
     if count != 1 or valence(state, u) > 1 or valence(state, v) > 1:
         return False
@@ -95,7 +95,7 @@ def is_isolated_face(state: State, u: int, v: int, count: int) -> bool:
 
 
 @kernel
-def may_change_topology(state: State, u: int, v: int, count: int) -> bool:
+def may_change_topology(state: CollapseState, u: int, v: int, count: int) -> bool:
     """Tests an edge where collapses may close handles.
 
     Further connections between the ends become edges of four faces, and faces that coincide with
@@ -132,12 +132,12 @@ def may_change_topology(state: State, u: int, v: int, count: int) -> bool:
             mark[y] = common
         if mark[x] < neighbour or mark[y] < neighbour:
             continue
-        other = state.head[v]
-        while other >= 0:
-            s, j = other // 3, other % 3
+        candidate = state.head[v]
+        while candidate >= 0:
+            s, j = candidate // 3, candidate % 3
             if triangle[s, (j + 1) % 3] == x and triangle[s, (j + 2) % 3] == y:
                 return False
-            other = state.next_corner[other]
+            candidate = state.next_corner[candidate]
     corner = state.head[v]
     while corner >= 0:
         t, k = corner // 3, corner % 3
@@ -151,7 +151,7 @@ def may_change_topology(state: State, u: int, v: int, count: int) -> bool:
 
 
 @kernel
-def has_counterpart_wedges(state: State, u: int, v: int, count: int) -> bool:
+def has_counterpart_wedges(state: CollapseState, u: int, v: int, count: int) -> bool:
     """Whether each wedge of u maps to one wedge of v across the faces of the edge, the first
     ``count`` rows of ``shared``."""
     shared, wedge = state.shared, state.wedge
@@ -161,10 +161,10 @@ def has_counterpart_wedges(state: State, u: int, v: int, count: int) -> bool:
                 return False
     corner = state.head[u]
     while corner >= 0:
-        other = wedge[corner // 3, corner % 3]
+        counterpart = wedge[corner // 3, corner % 3]
         mapped = False
         for i in range(count):
-            mapped |= shared[i, 0] == other
+            mapped |= shared[i, 0] == counterpart
         if not mapped:
             return False
         corner = state.next_corner[corner]
@@ -172,7 +172,7 @@ def has_counterpart_wedges(state: State, u: int, v: int, count: int) -> bool:
 
 
 @kernel
-def preserves_faces(state: State, u: int, v: int, px: float, py: float, pz: float) -> bool:
+def preserves_faces(state: CollapseState, u: int, v: int, px: float, py: float, pz: float) -> bool:
     """Whether no face of u without v flips or degenerates when u moves to (px, py, pz)."""
     triangle, point = state.triangle, state.point
     regular_cosine, thin_cosine, thin_height = (

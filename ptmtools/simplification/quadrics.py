@@ -23,7 +23,7 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
-from ptmtools.simplification.surface import COLOR_SHARE, Surface
+from ptmtools.simplification.surface import COLOR_SHARE, WeldedSurface
 
 SIZE = 11
 PER_ATTRIBUTE = 5
@@ -37,7 +37,7 @@ MAX_SCALE_RATIO = 32.0
 _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def vertex_quadrics(surface: Surface) -> Floats:
+def vertex_quadrics(surface: WeldedSurface) -> Floats:
     """(V, SIZE) quadrics of the planes and constrained edges of each vertex."""
     count = len(surface.point)
     a, b, c = (surface.point[surface.triangle[:, k]] for k in range(3))
@@ -66,7 +66,7 @@ def vertex_quadrics(surface: Surface) -> Floats:
     return quadric
 
 
-def attributes(mesh: Mesh, surface: Surface) -> Floats:
+def attributes(mesh: Mesh, surface: WeldedSurface) -> Floats:
     """(W, m) attributes of each wedge: texture coordinates unscaled, then colours as distances."""
     face, side = surface.source[surface.corner // 3], surface.corner % 3
     parts: list[Floats] = [np.zeros((len(face), 0))]
@@ -77,7 +77,7 @@ def attributes(mesh: Mesh, surface: Surface) -> Floats:
     return np.concatenate(parts, axis=1)
 
 
-def wedge_quadrics(mesh: Mesh, surface: Surface, attribute: Floats) -> Floats:
+def wedge_quadrics(mesh: Mesh, surface: WeldedSurface, attribute: Floats) -> Floats:
     """(W, 10 + PER_ATTRIBUTE m) quadrics of the (W, m) attributes over the faces of each wedge."""
     wedges, m = attribute.shape
     quadric = np.zeros((wedges, 10 + PER_ATTRIBUTE * m))
@@ -180,10 +180,10 @@ def shift_wedge(
 
 
 @kernel
-def add(quadric: Floats, row: int, other: int) -> None:
-    """Adds row ``other`` to a row."""
+def add(quadric: Floats, row: int, source: int) -> None:
+    """Adds row ``source`` to a row."""
     for j in range(quadric.shape[1]):
-        quadric[row, j] += quadric[other, j]
+        quadric[row, j] += quadric[source, j]
 
 
 @kernel

@@ -41,11 +41,11 @@ from ptmtools.simplification.state_kernels import (
     KEEP_TOPOLOGY,
     MAX_EDGE_FACES,
     TOPOLOGY,
+    CollapseState,
     Heap,
-    State,
     link_corners,
 )
-from ptmtools.simplification.surface import Surface, check_mesh, edges_of, surface_of
+from ptmtools.simplification.surface import WeldedSurface, check_mesh, edges_of, surface_of
 from ptmtools.simplification.topology import (
     FACES_PER_HANDLE,
     MAX_IRREDUCIBLE_SHARE,
@@ -55,7 +55,7 @@ from ptmtools.simplification.topology import (
 )
 
 
-def by_meshlab(mesh: Mesh, surface: Surface, faces: int) -> Simplified:
+def by_meshlab(mesh: Mesh, surface: WeldedSurface, faces: int) -> Simplified:
     """Simplifies a plain mesh by pymeshlab to about ``faces`` faces; the error is NaN.
 
     Raises
@@ -126,7 +126,7 @@ def simplify(
 
 
 def _simplify_surface(
-    mesh: Mesh, surface: Surface, options: SimplifyOptions, progress: Progress
+    mesh: Mesh, surface: WeldedSurface, options: SimplifyOptions, progress: Progress
 ) -> Simplified:
     before = topology(surface)
     state = _initial_state(mesh, surface)
@@ -146,20 +146,20 @@ def _simplify_surface(
     part[surface.source] = parts_of(
         edges_of(surface.triangle, len(surface.point)), len(surface.source)
     )
-    left = len(np.unique(part[result.source]))
-    if left == before.parts:
+    parts = len(np.unique(part[result.source]))
+    if parts == before.parts:
         return result
-    gone = f"{before.parts - left:,} of {before.parts:,} parts are gone"
+    gone = f"{before.parts - parts:,} of {before.parts:,} parts are gone"
     return replace(result, notes=(f"{gone}: they would hold many of the faces", *result.notes))
 
 
-def _initial_state(mesh: Mesh, surface: Surface) -> State:
+def _initial_state(mesh: Mesh, surface: WeldedSurface) -> CollapseState:
     attribute = attributes(mesh, surface)
     vertices, corners = len(surface.point), surface.triangle.size
     head, tail = np.full(vertices, -1, np.int32), np.full(vertices, -1, np.int32)
     next_corner = np.empty(corners, np.int32)
     link_corners(surface.triangle, head, tail, next_corner)
-    return State(
+    return CollapseState(
         point=surface.point,
         triangle=surface.triangle,
         constraint=surface.constraint,
@@ -183,7 +183,7 @@ def _initial_state(mesh: Mesh, surface: Surface) -> State:
     )
 
 
-def _collapse_all(state: State, faces: int, progress: Progress) -> None:
+def _collapse_all(state: CollapseState, faces: int, progress: Progress) -> None:
     """Collapses edges until ``faces`` faces are left or no legal collapse remains.
 
     Collapses that were illegal may become legal after others, so the heap is rebuilt until a pass
@@ -192,7 +192,7 @@ def _collapse_all(state: State, faces: int, progress: Progress) -> None:
     counters = state.counters
     begin = int(counters[FACES])
     total = begin - faces
-    heap = Heap.of(state.triangle.size + 64)
+    heap = Heap.empty(state.triangle.size + 64)
     for turn_limits in (STRICT_LIMITS, RELAXED_LIMITS):
         state.turn_limits[:] = turn_limits
         previous = -1
@@ -206,7 +206,9 @@ def _collapse_all(state: State, faces: int, progress: Progress) -> None:
                 progress(min(begin - int(counters[FACES]), total), total, "faces collapsed")
 
 
-def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions) -> Simplified:
+def _result(
+    mesh: Mesh, surface: WeldedSurface, state: CollapseState, options: SimplifyOptions
+) -> Simplified:
     remaining = np.flatnonzero(state.triangle[:, 0] >= 0)
     source = surface.source[remaining]
     used, triangles = np.unique(state.triangle[remaining], return_inverse=True)
@@ -216,7 +218,7 @@ def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions
     # Source corner of the attributes of each corner.
     corner = surface.corner[state.wedge[remaining]]
     face, side = surface.source[corner // 3], corner % 3
-    left = Mesh(
+    simplified = Mesh(
         points,
         triangles.reshape(-1, 3).astype(np.int32),
         None if mesh.material is None else mesh.material[source],
@@ -228,4 +230,4 @@ def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions
         edges = edges_of(triangles.reshape(-1, 3), len(used))
         inconsistent = int((edges.faces == 2).sum()) - len(edges.pairs[0])
     notes = missed_target_notes(len(source), options.faces, inconsistent)
-    return Simplified(left, source, float(np.sqrt(state.errors[0])) * surface.scale, notes)
+    return Simplified(simplified, source, float(np.sqrt(state.errors[0])) * surface.scale, notes)

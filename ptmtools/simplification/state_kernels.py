@@ -32,7 +32,7 @@ FACES, ENTRIES, MARKS, COLLAPSES, REJECTIONS, TOPOLOGY = 0, 1, 2, 3, 4, 5
 KEEP_TOPOLOGY, CLOSE_HANDLES, DROP_PARTS = 0, 1, 2
 
 
-class State(NamedTuple):
+class CollapseState(NamedTuple):
     """A mesh during edge collapses; kernels change all arrays in place.
 
     Attributes
@@ -92,7 +92,7 @@ def link_corners(
 
 
 @kernel
-def prune(state: State, v: int) -> None:
+def prune(state: CollapseState, v: int) -> None:
     """Removes the corners of removed faces from the list of a vertex."""
     triangle, head, tail, next_corner = state.triangle, state.head, state.tail, state.next_corner
     last, corner = -1, head[v]
@@ -111,7 +111,7 @@ def prune(state: State, v: int) -> None:
 
 
 @kernel
-def has_high_valence(state: State, v: int) -> bool:
+def has_high_valence(state: CollapseState, v: int) -> bool:
     """Whether a vertex has at least `HIGH_VALENCE` corners."""
     corner = state.head[v]
     for _ in range(HIGH_VALENCE):
@@ -122,7 +122,7 @@ def has_high_valence(state: State, v: int) -> bool:
 
 
 @kernel
-def faces_of_edge(state: State, a: int, b: int) -> int:
+def faces_of_edge(state: CollapseState, a: int, b: int) -> int:
     """Writes the faces of an edge to ``shared``; returns their number, -1 beyond `MAX_EDGE_FACES`.
 
     A row holds the wedges at a and b, the third vertex, and the constraint bits of the edge itself
@@ -135,31 +135,31 @@ def faces_of_edge(state: State, a: int, b: int) -> int:
         state.shared,
     )
     # Searching the faces of a high-valence vertex for each of its edges takes quadratic time.
-    one, two = (b, a) if has_high_valence(state, a) else (a, b)
-    column_one, column_two = (1, 0) if one == b else (0, 1)
-    count, corner = 0, state.head[one]
+    first, second = (b, a) if has_high_valence(state, a) else (a, b)
+    column_first, column_second = (1, 0) if first == b else (0, 1)
+    count, corner = 0, state.head[first]
     while corner >= 0:
         t, k = corner // 3, corner % 3
         corner = state.next_corner[corner]
         if triangle[t, 0] < 0:
             continue
         after, last = (k + 1) % 3, (k + 2) % 3
-        other, third = after, last
-        if triangle[t, last] == two:
-            other, third = last, after
-        elif triangle[t, after] != two:
+        neighbour, third = after, last
+        if triangle[t, last] == second:
+            neighbour, third = last, after
+        elif triangle[t, after] != second:
             continue
         if count == MAX_EDGE_FACES:
             return -1
         # The edge after a corner has the bit of that corner, the edge before it that of ``last``.
-        to_other = k if other == after else last
-        to_third = last if other == after else k
-        shared[count, column_one] = wedge[t, k]
-        shared[count, column_two] = wedge[t, other]
+        to_neighbour = k if neighbour == after else last
+        to_third = last if neighbour == after else k
+        shared[count, column_first] = wedge[t, k]
+        shared[count, column_second] = wedge[t, neighbour]
         shared[count, 2] = triangle[t, third]
-        shared[count, 3] = (constraint[t] >> to_other) & 1
-        shared[count, 4 + column_one] = (constraint[t] >> to_third) & 1
-        shared[count, 4 + column_two] = (constraint[t] >> after) & 1
+        shared[count, 3] = (constraint[t] >> to_neighbour) & 1
+        shared[count, 4 + column_first] = (constraint[t] >> to_third) & 1
+        shared[count, 4 + column_second] = (constraint[t] >> after) & 1
         count += 1
     return count
 
@@ -173,7 +173,7 @@ class Heap(NamedTuple):
     rejected: NDArray[np.int8]
 
     @staticmethod
-    def of(capacity: int) -> Heap:
+    def empty(capacity: int) -> Heap:
         return Heap(
             np.empty(capacity),
             np.empty((capacity, 2), np.int32),

@@ -37,7 +37,7 @@ Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class Surface:
+class WeldedSurface:
     """A welded mesh, scaled into a cube of side 1 to 2 about the origin.
 
     Attributes
@@ -65,7 +65,7 @@ class Surface:
     freedom: NDArray[np.int8]
 
 
-def surface_of(mesh: Mesh) -> Surface:
+def surface_of(mesh: Mesh) -> WeldedSurface:
     """Welds a mesh and finds its constrained edges. Raises ValueError as `check_mesh`."""
     check_mesh(mesh)
     source_point, vertex = distinct(mesh.points)
@@ -91,7 +91,7 @@ def surface_of(mesh: Mesh) -> Surface:
     freedom[ends == 2] = LINE
     wedges = np.bincount(triangle.reshape(-1)[corner], minlength=count)
     freedom[(ends == 0) & (wedges == 1)] = FREE
-    return Surface(
+    return WeldedSurface(
         point, source_point, centre, scale, source, triangle, constraint, wedge, corner, freedom
     )
 
@@ -130,7 +130,7 @@ def _separate_layers(triangle: Ints, source_point: Ints) -> tuple[Ints, Ints]:
 
 
 @dataclass(frozen=True)
-class Edges:
+class HalfEdges:
     """Edges of a mesh and their half-edges.
 
     Half-edge 3 t + k runs from corner k of face t to its next corner.
@@ -155,19 +155,19 @@ class Edges:
     @property
     def ends(self) -> tuple[Ints, Ints]:
         """(E,) lower and (E,) higher vertices of the edges."""
-        one, two = np.divmod(self.key, max(self.count, 1))
-        return one, two
+        first, second = np.divmod(self.key, max(self.count, 1))
+        return first, second
 
     @property
     def pairs(self) -> tuple[Ints, Ints]:
         """(P,) and (P,) opposite half-edges of the edges of two faces of consistent orientation."""
-        first = self.start[self.faces == 2]
-        one, two = self.order[first], self.order[first + 1]
-        agree = self.begin[one] != self.begin[two]
-        return one[agree], two[agree]
+        start = self.start[self.faces == 2]
+        first, second = self.order[start], self.order[start + 1]
+        agree = self.begin[first] != self.begin[second]
+        return first[agree], second[agree]
 
 
-def edges_of(triangle: NDArray[np.integer[Any]], count: int) -> Edges:
+def edges_of(triangle: NDArray[np.integer[Any]], count: int) -> HalfEdges:
     """Edges of (T, 3) triangles over ``count`` vertices."""
     begin = triangle.reshape(-1).astype(np.int64)
     end = np.roll(triangle, -1, axis=1).reshape(-1).astype(np.int64)
@@ -177,7 +177,7 @@ def edges_of(triangle: NDArray[np.integer[Any]], count: int) -> Edges:
     first[1:] = np.diff(edge[order]) != 0
     start = np.flatnonzero(first)
     faces = np.diff(start, append=len(order))
-    return Edges(order, start, faces, edge[order[start]], count, begin)
+    return HalfEdges(order, start, faces, edge[order[start]], count, begin)
 
 
 def _constraints(
@@ -186,18 +186,18 @@ def _constraints(
     """(T,) constraint bits; (3 T,) the first corner of each corner's wedge; (V,) the number of
     constrained edges of each vertex."""
     edges = edges_of(triangle, count)
-    one, two = edges.pairs
-    continuous = _is_continuous(mesh, source, one, two)
-    one, two = one[continuous], two[continuous]
+    first, second = edges.pairs
+    continuous = _is_continuous(mesh, source, first, second)
+    first, second = first[continuous], second[continuous]
 
     is_constrained = np.ones(triangle.size, bool)
-    is_constrained[one] = is_constrained[two] = False
+    is_constrained[first] = is_constrained[second] = False
     constraint = np.packbits(is_constrained.reshape(-1, 3), axis=1, bitorder="little").reshape(-1)
     is_edge_constrained = is_constrained[edges.order[edges.start]]
     ends = np.bincount(
         np.concatenate([end[is_edge_constrained] for end in edges.ends]), minlength=count
     )
-    pairs = [[one, next_corner(two)], [next_corner(one), two]]
+    pairs = [[first, next_corner(second)], [next_corner(first), second]]
     return constraint, connected(triangle.size, np.concatenate(pairs, axis=1).T), ends
 
 
@@ -206,20 +206,20 @@ def next_corner(corner: Ints) -> Ints:
     return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
-def _is_continuous(mesh: Mesh, source: Indices, one: Ints, two: Ints) -> Bools:
+def _is_continuous(mesh: Mesh, source: Indices, first: Ints, second: Ints) -> Bools:
     """(P,) whether material, texture coordinates and colours are continuous across edges, given
     by their opposite half-edges."""
-    face_one, face_two = source[one // 3], source[two // 3]
-    ends = ((one % 3, next_corner(two) % 3), (next_corner(one) % 3, two % 3))
-    same = np.ones(len(one), bool)
+    first_face, second_face = source[first // 3], source[second // 3]
+    ends = ((first % 3, next_corner(second) % 3), (next_corner(first) % 3, second % 3))
+    same = np.ones(len(first), bool)
     if mesh.material is not None:
-        same &= mesh.material[face_one] == mesh.material[face_two]
+        same &= mesh.material[first_face] == mesh.material[second_face]
     if mesh.uv is not None:
         for a, b in ends:
-            uv_one, uv_two = mesh.uv[face_one, a], mesh.uv[face_two, b]
-            tolerance = UV_SHARE * np.maximum(np.abs(uv_one), np.abs(uv_two))
-            same &= (np.abs(uv_one - uv_two) <= tolerance).all(axis=1)
+            first_uv, second_uv = mesh.uv[first_face, a], mesh.uv[second_face, b]
+            tolerance = UV_SHARE * np.maximum(np.abs(first_uv), np.abs(second_uv))
+            same &= (np.abs(first_uv - second_uv) <= tolerance).all(axis=1)
     if mesh.colors is not None:
         for a, b in ends:
-            same &= (mesh.colors[face_one, a] == mesh.colors[face_two, b]).all(axis=1)
+            same &= (mesh.colors[first_face, a] == mesh.colors[second_face, b]).all(axis=1)
     return same

@@ -24,7 +24,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.search import connected
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
-from ptmtools.simplification.surface import Edges, Surface, edges_of, next_corner
+from ptmtools.simplification.surface import HalfEdges, WeldedSurface, edges_of, next_corner
 
 #: Faces required by a handle, by a closed part and by a part with a boundary.
 FACES_PER_HANDLE, FACES_PER_CLOSED_PART, FACES_PER_OPEN_PART = 4, 4, 1
@@ -58,7 +58,7 @@ class Topology:
         return FACES_PER_HANDLE * self.handles + parts * (self.parts > 1)
 
 
-def topology(surface: Surface) -> Topology:
+def topology(surface: WeldedSurface) -> Topology:
     """Counts handles and parts. A boundary loop counts as closed by one polygon."""
     triangle = surface.triangle
     edges = edges_of(triangle, len(surface.point))
@@ -76,7 +76,7 @@ def topology(surface: Surface) -> Topology:
     return Topology(handles, parts - open_parts, open_parts)
 
 
-def parts_of(edges: Edges, faces: int) -> Ints:
+def parts_of(edges: HalfEdges, faces: int) -> Ints:
     """(T,) the lowest face index in the part of each face."""
     shares_edge = np.ones(len(edges.order), np.bool_)
     shares_edge[edges.start] = False
@@ -84,14 +84,17 @@ def parts_of(edges: Edges, faces: int) -> Ints:
     return connected(faces, edges.order[np.stack([later - 1, later], axis=1)] // 3)
 
 
-def _fans(edges: Edges, corners: int) -> Ints:
+def _fans(edges: HalfEdges, corners: int) -> Ints:
     """(3 T,) the lowest corner in the fan of each corner: the corners of its vertex that edges of
     two faces connect."""
-    first = edges.start[edges.faces == 2]
-    one, two = edges.order[first], edges.order[first + 1]
-    agree = edges.begin[one] != edges.begin[two]
-    begin, end = np.where(agree, next_corner(two), two), np.where(agree, two, next_corner(two))
-    return connected(corners, np.concatenate([[one, begin], [next_corner(one), end]], axis=1).T)
+    start = edges.start[edges.faces == 2]
+    first, second = edges.order[start], edges.order[start + 1]
+    agree = edges.begin[first] != edges.begin[second]
+    begin, end = (
+        np.where(agree, next_corner(second), second),
+        np.where(agree, second, next_corner(second)),
+    )
+    return connected(corners, np.concatenate([[first, begin], [next_corner(first), end]], axis=1).T)
 
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -136,7 +139,7 @@ class HoleBuffers(NamedTuple):
     loop: Ints
 
 
-def fill_small_holes(mesh: Mesh, surface: Surface, faces: int) -> FilledMesh | None:
+def fill_small_holes(mesh: Mesh, surface: WeldedSurface, faces: int) -> FilledMesh | None:
     """Fills the small holes of a mesh if they cost too large a share of the ``faces`` target faces;
     returns None otherwise."""
     if not surface.constraint.any():
@@ -145,8 +148,8 @@ def fill_small_holes(mesh: Mesh, surface: Surface, faces: int) -> FilledMesh | N
     edges = edges_of(triangle, len(surface.point))
     opposite = np.full(triangle.size, NON_MANIFOLD)
     opposite[edges.order[edges.start[edges.faces == 1]]] = BOUNDARY
-    one, two = edges.pairs
-    opposite[one], opposite[two] = two, one
+    first, second = edges.pairs
+    opposite[first], opposite[second] = second, first
     next_edge = np.full(triangle.size, NON_MANIFOLD)
     link_boundaries(opposite, next_edge)
 
@@ -297,8 +300,11 @@ def clip_ears(
     while count > 3:
         least, best = np.inf, -1
         for i in range(count):
-            one, two = loop[i - 1 if i else count - 1], loop[i + 1 if i + 1 < count else 0]
-            a, b = triangle[one // 3, one % 3], triangle[two // 3, two % 3]
+            previous, following = (
+                loop[i - 1 if i else count - 1],
+                loop[i + 1 if i + 1 < count else 0],
+            )
+            a, b = triangle[previous // 3, previous % 3], triangle[following // 3, following % 3]
             edge = min(a, b) * len(point) + max(a, b)
             at = np.searchsorted(key, edge)
             if a == b or (at < len(key) and key[at] == edge):

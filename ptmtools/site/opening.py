@@ -44,7 +44,7 @@ from ptmtools.output.emission import compressed
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Served
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import triangles_of
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE, NOTHING, OVERHEAD
 from ptmtools.texture.previews import coarse_levels
@@ -90,9 +90,9 @@ class NeedFinder:
         self._caster = Caster(served.surfaces)
 
     def needs(self, viewpoint: Mapping[str, Any]) -> Needs:
-        """Those on the screen of `Camera`."""
+        """Those on the screen of `RayCamera`."""
         triangles = self._triangles
-        camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
+        camera = RayCamera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
         eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
         sight = self._caster.look(camera, eye, direction)
         hit = np.flatnonzero(sight.triangle >= 0)

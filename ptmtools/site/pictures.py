@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.rendering.footprints import detail_of_pixels, footprints, show_colors
 from ptmtools.rendering.layers import Layer, Layers, blend, transparent_of
 from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import in_colors
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.scene.colors import to_srgb
 from ptmtools.site.catalogue import PICTURE
@@ -120,7 +120,7 @@ class _Textures(dict[int, Levels]):
     def read(self, textures: Iterable[int]) -> None:
         """Reads several, by threads: the lock of the interpreter is free while levels are
         decoded."""
-        for _ in ordered(self.__getitem__, sorted(textures), _THREADS):
+        for _ in map_in_order(self.__getitem__, sorted(textures), _THREADS):
             pass
 
 
@@ -142,11 +142,11 @@ class _Scene:
         meshes = [mesh for mesh in (self._triangles, self._light) if mesh]
         numbers = (mesh.texture[shown[shown >= 0]].tolist() for mesh in meshes)
         textures.read({number for group in numbers for number in group} - {-1})
-        yield from ordered(partial(self._jpeg, textures), frames, _THREADS)
+        yield from map_in_order(partial(self._jpeg, textures), frames, _THREADS)
 
     def _view(self, kind: PictureKind, view: Mapping[str, Any], textures: _Textures) -> _View:
         sight = _look(self._caster, kind.size, view)
-        sight, layers = self._layers.before(sight, partial(_alpha, self._triangles, textures))
+        sight, layers = self._layers.split(sight, partial(_alpha, self._triangles, textures))
         return _View(kind, sight, layers)
 
     def _jpeg(self, textures: _Textures, view: _View) -> bytes:
@@ -184,7 +184,7 @@ def _rays(size: tuple[int, int]) -> tuple[int, int]:
 
 def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -> Sight:
     width, height = _rays(size)
-    camera = Camera(width, height, viewpoint["fieldOfView"], width / height)
+    camera = RayCamera(width, height, viewpoint["fieldOfView"], width / height)
     sight = caster.look(camera, np.array(viewpoint["position"]), np.array(viewpoint["direction"]))
     # Levels are chosen for the pixels of the picture.
     return sight._replace(pixel=2 * np.tan(camera.field_of_view / 2) / size[1])

@@ -29,7 +29,7 @@ from urllib.parse import unquote
 from ptmtools.errors import OutputError
 from ptmtools.files import leads_inside
 from ptmtools.output.emission import compressed
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.progress import Progress
 from ptmtools.site.content import Site
 from ptmtools.site.entry import FRESH, Entry, state_of
@@ -95,7 +95,7 @@ def upload(
     def row_held(name: str) -> ObjectRow:
         return _row_held(objects, name, present.get(name), rows[name])
 
-    before = dict(zip(rows, ordered(row_held, rows, AT_ONCE), strict=True))
+    before = dict(zip(rows, map_in_order(row_held, rows, AT_ONCE), strict=True))
     # Headers take the place of gzip copies and of the file with caching rules.
     encode = objects.kind is not None
     entries = {unquote(name): entry for name, entry in site.entries.items()}
@@ -129,13 +129,13 @@ def upload(
     send = partial(_send, objects, items)
     # What replaces a former object waits for the new ones that it names, and the page for all.
     waves = [[name for name in step if name in changed] for step in steps]
-    uploads = chain.from_iterable(ordered(send, wave, AT_ONCE) for wave in waves)
+    uploads = chain.from_iterable(map_in_order(send, wave, AT_ONCE) for wave in waves)
     for number, _ in enumerate(uploads):
         progress(number, len(written), "files")
     old = steps_of_removal(before, items, options)
     waves = [[name for name in step if before[name].is_of(present.get(name))] for step in old]
     for wave in waves:
-        list(ordered(objects.remove, wave, AT_ONCE))
+        list(map_in_order(objects.remove, wave, AT_ONCE))
     gone = {*changed, *chain.from_iterable(old)}
     after = {name: row for name, row in before.items() if name not in gone}
     if written:

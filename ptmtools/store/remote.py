@@ -37,7 +37,7 @@ from ptmtools.files import (
     write_bytes,
     writing,
 )
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.progress import announce
 from ptmtools.store.copies import BUILDS, DATABASES, READERS, folder_for, note_url
 from ptmtools.store.digests import Digests
@@ -190,7 +190,7 @@ class RemoteDatabase:
         if self._version_now() != self._version:
             raise self._overtaken()
         missing = {d: name for name, d in now.items() if d not in self._sizes}
-        for _ in ordered(self._send, missing.items(), AT_ONCE):
+        for _ in map_in_order(self._send, missing.items(), AT_ONCE):
             pass
         before, last = self._before or (None, b"")
         if data != last:
@@ -205,7 +205,7 @@ class RemoteDatabase:
         if before:
             former = {*before.beyond(None, readable=True).values(), *before.lists().values()}
             old = former.difference(now.values()) & self._sizes.keys()
-            for _ in ordered(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
+            for _ in map_in_order(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
                 pass
 
     def _version_now(self) -> str:
@@ -250,7 +250,7 @@ class RemoteDatabase:
                 data = _held(builds / name, digest) or self.read(digest)
                 write_bytes(real_folder(self.folder, folder) / base, data, force=True)
 
-        for _ in ordered(bring, files.items(), AT_ONCE):
+        for _ in map_in_order(bring, files.items(), AT_ONCE):
             pass
 
     def _replace_manifest(self, manifest: Manifest, data: bytes) -> None:
@@ -316,7 +316,7 @@ def fetch_model(url: str) -> Path:
             parent, _, last = own.rpartition("/")
             write_bytes(real_folder(copy, parent) / last, objects.read(own), force=True)
 
-    for _ in ordered(bring, held, AT_ONCE):
+    for _ in map_in_order(bring, held, AT_ONCE):
         pass
     with writing(copy):
         for own in known.keys() - held.keys():

@@ -21,7 +21,7 @@ from typing import IO, Any
 import numpy as np
 
 from ptmtools.errors import InputError, LimitError, OutputError
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.texture.coder import Coder, Coding, Tile
 from ptmtools.texture.container import (
     DESCRIPTION_MAX,
@@ -278,7 +278,7 @@ class _LevelEncoder:
         start = file.tell()
         file.write(bytes(across * down * TILE_ENTRY.size))
         index, pair = bytearray(), LevelPair(0.0, 0.0, 0, 0)
-        for box, tile, more in ordered(coded, boxes(), self.threads):
+        for box, tile, more in map_in_order(coded, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
             pair += more

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.texture.coder import Coder, Coding, Shape, Tile
 from ptmtools.texture.coders.group import group_error
 from ptmtools.texture.container import (
@@ -271,7 +271,7 @@ class PtmReader:
             return area, tile.texels
 
         jobs = tiles_under(level.width, level.height, header.tile, box)
-        for area, part in ordered(decoded, jobs, self._threads):
+        for area, part in map_in_order(decoded, jobs, self._threads):
             shared = Box(
                 max(area.x0, box.x0),
                 max(area.y0, box.y0),

@@ -31,7 +31,7 @@ from ptmtools.files import open_below
 from ptmtools.glb import glb_chunks
 from ptmtools.output.served import on_link
 from ptmtools.output.surfaces import Surfaces
-from ptmtools.rendering.pyramids import mip_levels, packed
+from ptmtools.rendering.pyramids import mip_levels, pack_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import to_srgb
 from ptmtools.texture.images.opening import load, open_image, pillow_faults
@@ -297,7 +297,7 @@ def read_textures(folder: Path, stock: Stock, size: int) -> Pyramids:
     Raises InputError PTM-I122.
     """
     names = [stock.names[stock.diffuse(base, size)] for base in range(len(stock.bases))]
-    return packed([mip_levels(_image(folder, name, size)) for name in names])
+    return pack_pyramids([mip_levels(_image(folder, name, size)) for name in names])
 
 
 def _image(folder: Path, name: str, size: int) -> NDArray[np.uint8]:

@@ -32,7 +32,7 @@ from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.pyramids import full_colors, read_pyramids
-from ptmtools.rendering.rays import Camera, Caster, Frustum
+from ptmtools.rendering.rays import Caster, Frustum, RayCamera
 from ptmtools.rendering.records import Pyramids, triangles_of
 from ptmtools.walk import Walk
 from ptmtools_lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
@@ -91,7 +91,7 @@ def look(
     finest: Surfaces,
     coarsest: Surfaces,
     sizes: tuple[Pyramids, Pyramids, Pyramids],
-    camera: Camera,
+    camera: RayCamera,
     eye: Floats,
     direction: Floats,
     progress: Progress = silent,
@@ -240,7 +240,7 @@ def prepare_campus(
         if served is not None:
             textures = read_pyramids(served, progress) if pyramids is None else pyramids
             full = FullPicture(served.surfaces, textures)
-        camera = Camera(*pixels, walk.field_of_view, walk.aspect)
+        camera = RayCamera(*pixels, walk.field_of_view, walk.aspect)
         sizes = small, middle, large
         tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)
     low, high = stock.boxes[:, :3], stock.boxes[:, 3:]

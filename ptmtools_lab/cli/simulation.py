@@ -31,7 +31,7 @@ from ptmtools.output.served import read_served
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stage import Artifacts
 from ptmtools.quantities import count
-from ptmtools.rendering.light import lit
+from ptmtools.rendering.light import with_lamp
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk, walk_text
 from ptmtools_lab import figures
@@ -293,7 +293,7 @@ def simulate(
     walks = {file: read_walk(file) for file in walk_file} or _new_walks(db, seeds)
     served, other = read_served(db), read_served(against) if against else None
     if options.lit:
-        served, other = lit(served), lit(other) if other else None
+        served, other = with_lamp(served), with_lamp(other) if other else None
     require_hints(served, options.policies)
     with console.progress() as progress:
         pyramids = read_pyramids(served, progress)

@@ -133,7 +133,7 @@ def distance_shares(client: EngineClient, shapes: Ints) -> Floats:
 def by_box(client: EngineClient, shapes: Ints) -> Floats:
     """The shares of the screen that the boxes of the shapes cover, without occlusion."""
     stock = client.world.catalogue
-    covered = client.frustum.covered(stock.shapes.low[shapes], stock.shapes.high[shapes])
+    covered = client.frustum.covered_shares(stock.shapes.low[shapes], stock.shapes.high[shapes])
     return _summed(stock, shapes, covered)
 
 

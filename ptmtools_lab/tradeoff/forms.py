@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, areas
 from ptmtools.executor import Executor
-from ptmtools.light.looks import Rays as Light
-from ptmtools.light.occlusion import Surroundings, points_on
+from ptmtools.light.looks import RayLight as Light
+from ptmtools.light.occlusion import Occluders, points_on
 from ptmtools.pipeline.stages import SCENE
 from ptmtools.pipeline.warm_up import warm_objects
 from ptmtools.scene.model import Scene, SourceImage
@@ -215,7 +215,7 @@ def prepare_light(subject: Subject) -> Experiment:
 def light_experiment(scene: Scene, parts: Sequence[Part], most: int = MAX_SAMPLES) -> Experiment:
     """The experiment of the rays of baked light, before it is smoothed; ``most``: rays of the
     reference."""
-    around, own = Surroundings.of(scene), CampusOptions()
+    around, own = Occluders.from_scene(scene), CampusOptions()
     random = np.random.default_rng(0)
     chosen = []
     for part in parts:

@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints, areas
-from ptmtools.light.cells import ABOVE, COVERED, WHITE, Baking, CellLight, Piece, exposed
+from ptmtools.light.cells import ABOVE, COVERED, WHITE, CellLight, LightBaking, expose
 from ptmtools.light.lamps import lamps_of
 from ptmtools.light.looks import LightImage, lookup
-from ptmtools.light.mixing import mixed
-from ptmtools.light.occlusion import Surroundings
+from ptmtools.light.mixing import light_mix
+from ptmtools.light.model import CellSurfaces
+from ptmtools.light.occlusion import Occluders
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
 from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE
@@ -46,18 +47,23 @@ def prepare_lightmaps(subject: Subject, most: int = MOST) -> Experiment:
     dark = unlit_materials(scene, lights, painted=False)
     geometry, replaced = Geometry(scene, artifacts[CELLS]), scene_origin(artifacts).objects
 
-    def pieces(density: float) -> list[Piece]:
+    def pieces(density: float) -> list[CellSurfaces]:
         return pieces_of(geometry, artifacts[CELLS], dark, 1 / density, replaced)
 
-    around, own = Surroundings.of(scene), pieces(options.light_density)
-    mix = mixed(around, own, lamps_of(scene, lights), options, ABOVE, WHITE)
+    around, own = Occluders.from_scene(scene), pieces(options.light_density)
+    mix = light_mix(around, own, lamps_of(scene, lights), options, ABOVE, WHITE)
     lit = [n for n, piece in enumerate(own) if not piece.glass.all()]
     chosen = np.unique(np.linspace(0, len(lit) - 1, min(TRIED, len(lit))).astype(int)).tolist()
-    return lightmap_experiment(Baking(around, options, mix), pieces, [lit[n] for n in chosen], most)
+    return lightmap_experiment(
+        LightBaking(around, options, mix), pieces, [lit[n] for n in chosen], most
+    )
 
 
 def lightmap_experiment(
-    baking: Baking, pieces: Callable[[float], list[Piece]], cells: Sequence[int], most: int
+    baking: LightBaking,
+    pieces: Callable[[float], list[CellSurfaces]],
+    cells: Sequence[int],
+    most: int,
 ) -> Experiment:
     """The experiment of the texels and rays of the lightmaps of some cells. ``pieces``: of all
     cells, for texels to the metre; ``most``: rays of the reference."""
@@ -75,8 +81,8 @@ def lightmap_experiment(
         one, other = (look(face, point, random.random(POINTS)) for _ in range(2))
         open_to = one >= COVERED
         places.append((face[open_to], share[open_to]))
-        truth.append(exposed(one[open_to]))
-        again.append(exposed(other[open_to]))
+        truth.append(expose(one[open_to]))
+        again.append(expose(other[open_to]))
         replace(baking, options=replace(own, light_samples=1)).light(piece)  # compiles it
     right = np.concatenate([np.zeros(0), *truth])
     noise = 255 * (np.concatenate([np.zeros(0), *again]) - right)
@@ -115,7 +121,7 @@ def lightmap_experiment(
     )
 
 
-def _shown(light: CellLight, piece: Piece, face: Ints, share: Floats) -> Floats:
+def _shown(light: CellLight, piece: CellSurfaces, face: Ints, share: Floats) -> Floats:
     """(n,) the light, 0 to 1, that clients show at places of (n,) faces."""
     at_vertices = np.einsum("nk,nk->n", share, light.vertex[face] / 255)
     if light.texels is None:

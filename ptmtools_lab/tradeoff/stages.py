@@ -33,7 +33,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.ach import choose
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
-from ptmtools.coverage.sampling import CellHints, Sampler
+from ptmtools.coverage.sampling import CellHints, HintSampler
 from ptmtools.errors import MissingComponentError
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.scene.model import Scene, SourceImage
@@ -214,8 +214,8 @@ class CoverageTrade:
         asked = [int(cell) for cell in (self.tried if cells is None else cells)]
         backend = choose(self._cells, self._pvs, options)
 
-        def ready() -> Sampler:
-            return Sampler(self._scene, self._cells, self._pvs, options, backend)
+        def ready() -> HintSampler:
+            return HintSampler(self._scene, self._cells, self._pvs, options, backend)
 
         ready().renderer.close()  # loading once is no part of the cost
         sampler, before = timed(ready)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.executor import Executor
 from ptmtools.lazy import component
-from ptmtools.light.occlusion import Surroundings
+from ptmtools.light.occlusion import Occluders
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Material, Scene
@@ -123,7 +123,7 @@ def make_campus(
         scene.two_sided,
         material,
         materials,
-        Surroundings.of(scene),
+        Occluders.from_scene(scene),
         options,
         painted,
     )

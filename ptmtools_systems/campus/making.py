@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.light.atlas import unwrap
 from ptmtools.light.lightmap import bake, vertex_light
-from ptmtools.light.looks import Painted, Rays, open_sides
-from ptmtools.light.occlusion import Surroundings, normals
+from ptmtools.light.looks import PaintedLight, RayLight, open_sides
+from ptmtools.light.occlusion import Occluders, normals
 from ptmtools.scene.colors import encoded, to_linear
 from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
 from ptmtools_systems.campus.meshes import Corners, mesh_bytes
@@ -79,7 +79,7 @@ class Work:
     two_sided: Bools
     material: NDArray[np.int32]
     materials: tuple[CampusMaterial, ...]
-    around: Surroundings
+    around: Occluders
     options: CampusOptions
     painted: ModelLight | None = None
 
@@ -175,13 +175,13 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
 
 def _look(
     work: Work, faces: Ints, finest: Floats, level: Simplified, side: Floats
-) -> Rays | Painted:
+) -> RayLight | PaintedLight:
     """The light on the faces of a level; ``finest``: (T, 3, 3) those of the finest one, ``side``:
     (T,) their lit sides."""
     if (painted := work.painted) is not None:
         image = painted.image[faces]
-        return Painted(finest, painted.uv[faces], image, painted.images, level.source)
-    return Rays(
+        return PaintedLight(finest, painted.uv[faces], image, painted.images, level.source)
+    return RayLight(
         work.around,
         level.mesh.points[level.mesh.triangles],
         work.options.samples,

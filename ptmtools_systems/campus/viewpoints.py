@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from ptmtools.arrays import Floats, areas
-from ptmtools.light.occlusion import Surroundings, points_on, spread_over
+from ptmtools.light.occlusion import Occluders, points_on, spread_over
 from ptmtools_systems.campus.model import Vector
 
 #: Height of eyes, and least and greatest distance from a box, metres.
@@ -29,7 +29,7 @@ _POINTS, _ALIKE = 64, 0.05
 STEP = 0.6
 
 
-def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector, Vector]:
+def viewpoint(around: Occluders, corner: Floats, box: Floats) -> tuple[Vector, Vector]:
     """Position and unit direction of a view of an object.
 
     Parameters
@@ -83,7 +83,7 @@ def _candidates(low: Floats, high: Floats) -> Floats:
     return np.asarray((middle + (edge + away)[..., None] * way).reshape(-1, 2))
 
 
-def _heights(around: Surroundings, place: Floats) -> tuple[Floats, Floats]:
+def _heights(around: Occluders, place: Floats) -> tuple[Floats, Floats]:
     """(n,) heights of the highest and of the lowest surface at (n, 2) places; the ground of the
     scene where there is none."""
     least, most = around.points[:, 1].min(), around.points[:, 1].max()
@@ -104,7 +104,7 @@ def _points_of(corner: Floats) -> Floats:
     return points_on(corner[face], np.arange(1, _POINTS + 1))
 
 
-def _seen(around: Surroundings, eyes: Floats, target: Floats) -> Floats:
+def _seen(around: Occluders, eyes: Floats, target: Floats) -> Floats:
     """(n,) the share of points that is visible from each of (n, 3) eyes."""
     origin, end = np.repeat(eyes, len(target), axis=0), np.tile(target, (len(eyes), 1))
     return np.asarray(around.free(origin, end).reshape(len(eyes), -1).mean(axis=1))

@@ -18,7 +18,7 @@ from ptmtools.output.content import Content
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.names import HINTS, texture_name
 from ptmtools.output.validation.files import ServedDatabase
-from ptmtools.parallel import ordered
+from ptmtools.parallel import map_in_order
 from ptmtools.texture import reader
 from ptmtools.texture.images import Picture
 from ptmtools.texture.model import Limits
@@ -49,7 +49,7 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
                 f"the texture {record.file!r} was not encoded",
                 remedy="run the stage `textures` again",
             )
-    sets = ordered(_interlaced, content.textures, content.extras.workers)
+    sets = map_in_order(_interlaced, content.textures, content.extras.workers)
     for record, written in zip(content.textures, sets, strict=True):
         folder = INTERLACED.texture_files.replace("{name}", texture_name(record.file))
         for name, data in written.named():

@@ -11,7 +11,7 @@ from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdiv
 from ptmtools.cells.groups import join_by_gain
 from ptmtools.cells.model import EyeRegion
 from ptmtools.cells.options import WALKER
-from ptmtools.coverage.placement import Volume
+from ptmtools.coverage.placement import CellVolume
 from ptmtools.diagnostics import Warned
 from ptmtools.scene.model import Camera, Scene
 from ptmtools.visibility import check_conservative, compute_pvs
@@ -136,7 +136,7 @@ def test_where_a_viewpoint_was_asked_for_one_stands(attic: Scene) -> None:
 
 def test_hints_are_sampled_where_eyes_are(quads, room_faces) -> None:
     tower = quads(room_faces((0, 0, -4), (8, 30, 4)))
-    (volume,) = Volume.of_cells(subdivide(tower))
+    (volume,) = CellVolume.of_cells(subdivide(tower))
     for points in (
         volume.sobol(0, 4096, 0),
         volume.random(0, 4096, 0),

@@ -12,7 +12,7 @@ import pytest
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import BACKENDS
-from ptmtools.coverage.item_buffer import Renderer, Surfaces
+from ptmtools.coverage.item_buffer import ItemRenderer, ItemSurfaces
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene.model import Material, Scene
@@ -33,7 +33,7 @@ def pixel_centres() -> Callable[[int], np.ndarray]:
 
 
 @contextmanager
-def renderer_of(backend: str, surfaces: Surfaces, face: int) -> Iterator[Renderer]:
+def renderer_of(backend: str, surfaces: ItemSurfaces, face: int) -> Iterator[ItemRenderer]:
     renderer = BACKENDS[backend].open(surfaces, face)
     try:
         yield renderer
@@ -42,7 +42,7 @@ def renderer_of(backend: str, surfaces: Surfaces, face: int) -> Iterator[Rendere
 
 
 @pytest.fixture(scope="session")
-def drawing() -> Callable[..., AbstractContextManager[Renderer]]:
+def drawing() -> Callable[..., AbstractContextManager[ItemRenderer]]:
     """``with drawing(backend, surfaces, face) as renderer``."""
     return renderer_of
 
@@ -59,7 +59,7 @@ def sample_points() -> Callable[..., SamplePoints]:
 
 
 def counted(
-    renderer: Renderer, surfaces: Surfaces, cells: Cells, at: SamplePoints, face: int
+    renderer: ItemRenderer, surfaces: ItemSurfaces, cells: Cells, at: SamplePoints, face: int
 ) -> list[int]:
     counter = PixelCounter(renderer, surfaces, cells, face)
     tally = counter.count(at, np.arange(surfaces.cell_count))
@@ -71,7 +71,7 @@ def coverage_at() -> Callable[..., np.ndarray]:
     """``coverage_at(backend, scene, cells, point, face)``: pixels of each cell, then of none."""
 
     def at(backend, scene, cells, point, face=64, near=1e-3):
-        surfaces = Surfaces.of(scene, cells)
+        surfaces = ItemSurfaces.from_scene(scene, cells)
         with renderer_of(backend, surfaces, face) as renderer:
             return counted(renderer, surfaces, cells, sample_points_at(point, near), face)
 

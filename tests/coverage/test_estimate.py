@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import GROUPS, AchOptions
-from ptmtools.coverage.sampling import estimate, grouped, ninety_fifth, shares, spread
+from ptmtools.coverage.sampling import estimate, group_numbers, ninety_fifth, shares, spread
 from ptmtools.visibility.model import Pvs
 
 COUNTS = st.integers(1, 6).flatmap(
@@ -66,7 +66,7 @@ def test_the_ninety_fifth_of_twenty_is_the_last_but_one():
 
 @given(st.integers(0, 300))
 def test_groups_are_stretches_of_equal_length(count):
-    group = grouped(count)
+    group = group_numbers(count)
     assert np.array_equal(group, np.sort(group))
     size = np.bincount(group)
     assert len(size) == min(count, GROUPS)
@@ -75,15 +75,15 @@ def test_groups_are_stretches_of_equal_length(count):
 
 
 def test_of_parts_in_order_every_eighth_is_a_group():
-    group = grouped(20, in_stretches=False)
+    group = group_numbers(20, in_stretches=False)
     assert group.tolist() == [*range(8), *range(8), *range(4)]
-    assert grouped(3, in_stretches=False).tolist() == [0, 1, 2]
-    assert grouped(0, in_stretches=False).tolist() == []
+    assert group_numbers(3, in_stretches=False).tolist() == [0, 1, 2]
+    assert group_numbers(0, in_stretches=False).tolist() == []
 
 
 def test_views_weighted_by_what_they_show_are_the_whole():
     counts = np.random.default_rng(0).integers(0, 50, (40, 6, 5)) * [9, 3, 1, 1, 0]
-    row = estimated(counts, grouped(40), 1)
+    row = estimated(counts, group_numbers(40), 1)
     assert row.views.shape == (5, 6)
     assert row.views.sum(axis=0) == pytest.approx(np.ones(6), abs=1e-15)
     weight = counts.sum(axis=(0, 2))
@@ -92,14 +92,14 @@ def test_views_weighted_by_what_they_show_are_the_whole():
 
 
 def test_an_empty_view_has_1_for_the_cell_itself():
-    row = estimated(in_all_views(np.array([[3, 1], [5, 1]])), grouped(2), 1)
+    row = estimated(in_all_views(np.array([[3, 1], [5, 1]])), group_numbers(2), 1)
     assert row.views[:, 0].tolist() == [0.8, 0.2]
     assert row.views[:, 1:].tolist() == [[1.0] * 5, [0.0] * 5]
 
 
 def test_points_that_see_nothing_count_as_points():
     at_points = np.array([[4, 4], [0, 0], [0, 0], [8, 0]])
-    row = estimated(in_all_views(at_points), grouped(4), 4)
+    row = estimated(in_all_views(at_points), group_numbers(4), 4)
     assert row.value.tolist() == [0.75, 0.25]
     assert row.pixels.tolist() == [3, 1]
     assert row.seen.tolist() == [0.5, 0.25]
@@ -115,7 +115,7 @@ def test_points_that_see_nothing_count_as_points():
     ],
 )
 def test_nothing_seen_no_points_and_one_say_nothing_of_errors(at_points, value, seen):
-    row = estimated(in_all_views(at_points), grouped(len(at_points)), 1)
+    row = estimated(in_all_views(at_points), group_numbers(len(at_points)), 1)
     assert row.value.tolist() == value
     assert row.seen.tolist() == seen
     assert row.p95.tolist() == [v * s for v, s in zip(value, seen, strict=True)]
@@ -126,7 +126,7 @@ def test_nothing_seen_no_points_and_one_say_nothing_of_errors(at_points, value, 
 
 def test_what_was_never_met_has_no_error_of_0():
     at_points = np.random.default_rng(1).integers(1, 9, (16, 3)) * [1, 1, 0]
-    row = estimated(in_all_views(at_points), grouped(16), 1)
+    row = estimated(in_all_views(at_points), group_numbers(16), 1)
     assert np.isnan(row.error).tolist() == [False, False, True]
     assert row.error[0] > 0
     assert row.value[2] == row.seen[2] == row.p95[2] == 0
@@ -156,7 +156,7 @@ def test_error_bars_are_as_wide_as_the_truth_is_far(name):
     """The root mean square of the standard errors against that of the errors; the bound of the
     total variation against how often it holds."""
     counts, truth = simulated(*MIXTURES[name], runs=1500, seed=2)
-    group = grouped(counts.shape[1])
+    group = group_numbers(counts.shape[1])
     actual = [spread(run, group) for run in counts]
     away = np.array([shares(run.sum(axis=0)) for run in counts]) - truth
     claimed = np.sqrt(np.mean([error**2 for error, _ in actual], axis=0))

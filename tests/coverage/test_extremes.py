@@ -12,12 +12,12 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.backends import BACKENDS
 from ptmtools.coverage.backends.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces
+from ptmtools.coverage.item_buffer import VIEWS, ItemSurfaces
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Volume
+from ptmtools.coverage.placement import CellVolume
 from ptmtools.coverage.sample_points import PointFinder
-from ptmtools.coverage.sampling import CLEARANCE, Sampler
-from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.sampling import CLEARANCE, HintSampler
+from ptmtools.coverage.solids import SampleObstacles
 from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene.model import Material, Scene
 from ptmtools.visibility.model import Pvs
@@ -323,7 +323,7 @@ def test_five_thousand_cells(room_row, furnish, backend):
     # The default clearance goes by the extent, and would be 5 cm here.
     options = AchOptions(samples=64, face=8, backend=backend, clearance=1e-3)
     expected = compute_ach(*room_row(2), all_visible(2), options)
-    sampler = Sampler(scene, cells, pvs, options, BACKENDS[backend])
+    sampler = HintSampler(scene, cells, pvs, options, BACKENDS[backend])
     for cell in some:
         hints = sampler.of_cell(cell)
         # A float32 is 1 mm fine here.
@@ -365,7 +365,7 @@ def test_seventy_thousand_cells(
         of = scene.triangle_material.copy()
         of[-2 * side**2 :] = 1 + np.repeat(number % 3, 2)
         scene = replace(scene, materials=painted, triangle_material=of)
-    surfaces = Surfaces.of(scene, cells)
+    surfaces = ItemSurfaces.from_scene(scene, cells)
     assert surfaces.cell_count == side**2 > 2**16
     eye, face = np.array([85.3, 40.7, 55.1]), 128
     v = 3  # the view down
@@ -396,7 +396,9 @@ def test_seventy_thousand_cells(
 def finder(room_row, points, clearance):
     """Where points are taken in turn from those given, in a room."""
     scene, cells = room_row(1)
-    at = PointFinder(Volume.of_cells(cells)[0], Obstacles.of(scene, cells), clearance)
+    at = PointFinder(
+        CellVolume.of_cells(cells)[0], SampleObstacles.from_scene(scene, cells), clearance
+    )
     return at, at.usable(np.array(points, dtype=np.float64).reshape(-1, 3))
 
 
@@ -470,7 +472,7 @@ def test_rays_start_at_the_sample_point(room_row, sample_points):
     scene, cells = room_row(1)
     far_off = 1e6 * np.array([4.0, -4, 4])
     moved = replace(cells, vertex=cells.vertex + far_off, root_box=cells.root_box + far_off)
-    there = Surfaces.of(scene.with_points(scene.points + far_off), moved)
+    there = ItemSurfaces.from_scene(scene.with_points(scene.points + far_off), moved)
     at = sample_points(np.array([2.1, 1.7, 0.3]) + far_off)
     _, place = EmbreeRenderer(there, 8).trace(at, np.arange(6 * 64))
     away = np.abs(place[0] - far_off - [2, 2, 0]).max(axis=1)

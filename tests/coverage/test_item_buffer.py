@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings, strategies as st
 
 from ptmtools.coverage.backends.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces
+from ptmtools.coverage.item_buffer import VIEWS, ItemSurfaces
 from ptmtools.coverage.tally import PixelCounter
 
 FACE = 64
@@ -220,7 +220,7 @@ def test_backends_agree_anywhere(room_row, coverage_at, gl, eye, face):
     move by that row; no more than a few such rows at a time. From the very plane of a partition
     that plane is a row in each of four views, and where rooms meet in it either may win."""
     scene, cells = room_row(3)
-    surfaces = Surfaces.of(scene, cells)
+    surfaces = ItemSurfaces.from_scene(scene, cells)
     assert surfaces.scale == 2.0**-4
     by_gl = coverage_at("gl", scene, cells, eye, face)
     by_rays = coverage_at("embree", scene, cells, eye, face)
@@ -252,7 +252,7 @@ class Doubtful:
 
 def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row, sample_points):
     scene, cells = room_row(3)
-    surfaces = Surfaces.of(scene, cells)
+    surfaces = ItemSurfaces.from_scene(scene, cells)
     rays = EmbreeRenderer(surfaces, FACE)
     eye = sample_points([2.0, 1.7, 0.3])
 
@@ -277,7 +277,7 @@ def test_what_reaches_in_by_less_than_a_tolerance_is_seen_where_it_is(
     scene, cells = room_row(3)
     reach = rectangle_across(8.0 - 1e-5, (0, 3), (1.2, 1.8))
     scene, cells = furnish(scene, cells, [reach], [(2, 2)])
-    surfaces = Surfaces.of(scene, cells)
+    surfaces = ItemSurfaces.from_scene(scene, cells)
     rays = EmbreeRenderer(surfaces, FACE)
     counter = PixelCounter(rays, surfaces, cells, FACE)
     at = sample_points([6, 1.7, 0.3])
@@ -293,7 +293,7 @@ def test_rays_through_some_pixels_are_the_rays_through_all(
 ):
     scene, cells = room_row(2)
     pane = rectangle_across(4.0, (0, 3), (-1, 1))
-    surfaces = Surfaces.of(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
+    surfaces = ItemSurfaces.from_scene(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
     at = sample_points([[1.0, 1.7, 0.3], [2.5, 1.1, -0.3]], shift=(0.3, -0.6))
     whole = EmbreeRenderer(surfaces, FACE).show(at)
     assert whole.shape == (2, 2, 6, FACE**2)
@@ -304,7 +304,7 @@ def test_rays_through_some_pixels_are_the_rays_through_all(
     assert np.array_equal(actual, whole.reshape(2, -1)[:, pixels])
     hit = actual[0] >= 0
     plane = surfaces.plane[actual[0][hit]]
-    off = np.einsum("ij,ij->i", plane[:, :3], surfaces.normalised(place[0][hit])) + plane[:, 3]
+    off = np.einsum("ij,ij->i", plane[:, :3], surfaces.normalise(place[0][hit])) + plane[:, 3]
     assert np.abs(off).max() < 1e-6
     assert np.mean(drawn != whole) < 1e-3  # triangles that share an edge may share its pixels
 
@@ -313,7 +313,7 @@ def test_many_points_at_once_are_each_alone(room_row, furnish, backend, sample_p
     """More than fit into one target or one batch of rays, some in other rooms."""
     scene, cells = room_row(3)
     pane = rectangle_across(4.0, (0, 3), (-1, 1))
-    surfaces = Surfaces.of(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
+    surfaces = ItemSurfaces.from_scene(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
     points = np.random.default_rng(1).uniform([0.2, 0.2, -1.8], [11.8, 3.8, 1.8], (50, 3))
     face = 16
     with drawing(backend, surfaces, face) as renderer:
@@ -327,7 +327,7 @@ def test_many_points_at_once_are_each_alone(room_row, furnish, backend, sample_p
 def test_culled_surfaces_would_not_show(room_row, sample_points, drawing, gl):
     """Only what the PVS needs is drawn; what stands outside it and shows is drawn nevertheless."""
     scene, cells = room_row(3)
-    surfaces = Surfaces.of(scene, cells)
+    surfaces = ItemSurfaces.from_scene(scene, cells)
     at = sample_points([[2.0, 1.7, 0.3], [1.0, 1.0, 1.0]])
     with drawing("gl", surfaces, FACE) as renderer:
         every = renderer.show(at)
@@ -343,7 +343,7 @@ def test_many_small_views_between_two_near_surfaces(room_row, sample_points, dra
     scene, cells = room_row(3)
     flat = np.array([1.0, 5e-4, 1.0])
     slab = scene.with_points(scene.points * flat), replace(cells, vertex=cells.vertex * flat)
-    surfaces = Surfaces.of(*slab)
+    surfaces = ItemSurfaces.from_scene(*slab)
     points = np.random.default_rng(3).uniform([0.1, 0.2, -1.9], [11.9, 3.8, 1.9], (60, 3)) * flat
     at = sample_points(points, near=5e-5, shift=(0.2, 0.1))
     face = 8

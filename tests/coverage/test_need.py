@@ -19,7 +19,7 @@ from ptmtools.coverage.required_levels import (
     compute_need,
     levels_of_detail,
 )
-from ptmtools.coverage.sampling import Sampler
+from ptmtools.coverage.sampling import HintSampler
 from ptmtools.errors import InputError
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
@@ -90,7 +90,7 @@ def test_rays_followed_one_by_one_want_the_same(rooms: Artifacts, need: Need) ->
     lie on an edge, where another triangle may be met."""
     scene, cells, pvs = rooms[SCENE], rooms[CELLS], rooms[PVS]
     assert all(material.image in (-1, *SIZES) for material in scene.materials)
-    sampler = Sampler(scene, cells, pvs, OPTIONS, BACKENDS["embree"])
+    sampler = HintSampler(scene, cells, pvs, OPTIONS, BACKENDS["embree"])
     points = sampler.points_of(0)
     assert len(points) == POINTS
     origin, along = sampler.renderer._rays(points)

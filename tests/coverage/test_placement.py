@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import volumes
-from ptmtools.coverage.placement import TRIES, Volume, filling, sobol, strata, uniform
+from ptmtools.coverage.placement import TRIES, CellVolume, filling, sobol, strata, uniform
 
 FROZEN_SOBOL = [
     [
@@ -52,7 +52,7 @@ CORNER = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]], dtype=np.float
 
 
 def volume(cells, cell):
-    return Volume.of_cells(cells)[cell]
+    return CellVolume.of_cells(cells)[cell]
 
 
 def filled(tetra, unit):

@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.required_levels import ALL, ANISOTROPY, ASPECT, Screen, unresolved_levels
+from ptmtools.coverage.required_levels import (
+    ALL,
+    ANISOTROPY,
+    ASPECT,
+    VisitorScreen,
+    unresolved_levels,
+)
 from ptmtools.scene.model import Material, Scene, SourceImage
 from ptmtools.visibility.model import Pvs
 
 ROOMS = 2
-SCREEN = Screen(1080, 60.0, 0.25)
+SCREEN = VisitorScreen(1080, 60.0, 0.25)
 RoomRow = Callable[[int], tuple[Scene, Cells]]
 #: Of a room's quadrilaterals.
 FLOOR, CEILING = 0, 1

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.coverage.kernels import distance
-from ptmtools.coverage.solids import Obstacles, edge_groups, edges, solids
+from ptmtools.coverage.solids import SampleObstacles, edge_groups, edges, solids
 
 SPAN = st.floats(-4, 4).map(lambda x: round(x, 3))
 POINT = st.tuples(SPAN, SPAN, SPAN)
@@ -34,7 +34,7 @@ INSIDE, OUTSIDE = np.array([1.4, 1.3, -0.45]), np.array([3.1, 1.3, 1.15])
 
 def around(room_row, furnish, quads, sides=(0, 0)):
     scene, cells = room_row(1)
-    return Obstacles.of(*furnish(scene, cells, quads, [sides] * len(quads)))
+    return SampleObstacles.from_scene(*furnish(scene, cells, quads, [sides] * len(quads)))
 
 
 def test_inside_a_statue(room_row, furnish):
@@ -62,7 +62,9 @@ def test_a_statue_may_stand_on_the_floor(room_row, furnish):
     scene, cells = room_row(1)
     quads = box([1, 0, -1], [2, 2.5, 0])
     sides = [(0, -1) if i == 2 else (0, 0) for i in range(6)]
-    assert Obstacles.of(*furnish(scene, cells, quads, sides)).in_solid(INSIDE[None])[0]
+    assert SampleObstacles.from_scene(*furnish(scene, cells, quads, sides)).in_solid(INSIDE[None])[
+        0
+    ]
 
 
 def test_structure_is_the_subdivisions_business(room_row, furnish):

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.item_buffer import Surfaces
+from ptmtools.coverage.item_buffer import ItemSurfaces
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Volume
+from ptmtools.coverage.placement import CellVolume
 from ptmtools.coverage.sample_points import PointFinder, PointSequence
 from ptmtools.coverage.sampling import CLEARANCE
-from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.solids import SampleObstacles
 from ptmtools.coverage.tally import Owners
 from ptmtools.scene.model import Material
 from ptmtools.visibility.model import Pvs
@@ -91,10 +91,12 @@ def test_textures_are_counted_where_they_are_seen(room_row, backend, drawing):
     scene = painted(scene, images)
     options = replace(BY_TEXTURE, backend=backend)
     ach = compute_ach(scene, cells, all_visible(2), options)
-    surfaces = Surfaces.of(scene, cells)
+    surfaces = ItemSurfaces.from_scene(scene, cells)
     clearance = CLEARANCE * scene.tolerance.thin
     for cell in range(2):
-        finder = PointFinder(Volume.of_cells(cells)[cell], Obstacles.of(scene, cells), clearance)
+        finder = PointFinder(
+            CellVolume.of_cells(cells)[cell], SampleObstacles.from_scene(scene, cells), clearance
+        )
         points = PointSequence(finder, "sobol", 0).take(options.points)
         with drawing(backend, surfaces, options.side) as renderer:
             shows = renderer.show(points)[0]
@@ -154,7 +156,7 @@ def test_what_belongs_to_no_cell_keeps_its_image_where_the_cell_has_it(room_row)
 def test_owners_of_images(room_row):
     scene, cells = room_row(2)
     scene = painted(scene, {FLOOR: 2, CEILING: 2, 4 + FLOOR: 0})
-    owners = Owners.of(Surfaces.of(scene, cells), by_image=True)
+    owners = Owners.from_surfaces(ItemSurfaces.from_scene(scene, cells), by_image=True)
     assert list(zip(owners.cell.tolist(), owners.image.tolist(), strict=True)) == [
         (0, -1),
         (0, 2),
@@ -167,8 +169,8 @@ def test_owners_of_images(room_row):
     assert begin.tolist() == [0, 2]
     cell = np.array([0, 0, 0, 1, 1, -1], np.int32)
     image = np.array([2, 0, -1, 0, 2, 0], np.int32)
-    assert owners.at(cell, image).tolist() == [1, 0, 0, 3, 2, -1]
-    plain = Owners.of(Surfaces.of(scene, cells), by_image=False)
+    assert owners.numbers(cell, image).tolist() == [1, 0, 0, 3, 2, -1]
+    plain = Owners.from_surfaces(ItemSurfaces.from_scene(scene, cells), by_image=False)
     assert plain.cell.tolist() == [0, 1]
     assert plain.image.tolist() == [-1, -1]
 
@@ -180,5 +182,7 @@ def test_a_cell_without_surfaces_has_an_owner_all_the_same(room_row):
     options = replace(BY_TEXTURE, backend="embree")
     ach = compute_ach(scene, replace(cells, triangle_cell=owner), all_visible(3), options)
     assert (ach.value > 0).all(), "located in the room that they are seen in"
-    bare = Owners.of(Surfaces.of(scene, replace(cells, triangle_cell=owner)), by_image=True)
+    bare = Owners.from_surfaces(
+        ItemSurfaces.from_scene(scene, replace(cells, triangle_cell=owner)), by_image=True
+    )
     assert bare.cell.tolist() == [0, 1, 2]

@@ -22,7 +22,7 @@ from ptmtools.cli.main import main  # noqa: E402
 from ptmtools.output.object_maps import frame_axes  # noqa: E402
 from ptmtools.output.served import Served, read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
-from ptmtools.rendering.rays import Camera, Caster  # noqa: E402
+from ptmtools.rendering.rays import Caster, RayCamera  # noqa: E402
 from ptmtools.rendering.records import Sight  # noqa: E402
 from ptmtools_systems.apo.normal_map import looked_up  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
@@ -46,7 +46,7 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def seen(served: Served, angle: float) -> tuple[Sight, np.ndarray]:
     """What is seen from the eye, and (HEIGHT, WIDTH) whether it is the inside of a statue."""
     eye = np.array(served.index["viewpoints"][0]["position"])
-    camera = Camera(WIDTH, HEIGHT, angle, WIDTH / HEIGHT, HEIGHT)
+    camera = RayCamera(WIDTH, HEIGHT, angle, WIDTH / HEIGHT, HEIGHT)
     sight = Caster(served.surfaces).look(camera, eye, np.array([0.0, 0.0, -1.0]))
     relief = served.surfaces.relief
     assert relief is not None

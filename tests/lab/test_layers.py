@@ -16,8 +16,8 @@ from ptmtools.progress import silent
 from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.layers import MOST, Layers, blend, transparent_of
 from ptmtools.rendering.light import GLOW
-from ptmtools.rendering.painting import Painter
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.painting import SurfacePainter
+from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Sight, triangles_of
 from tests.lab.worlds import SEEDS
 
@@ -56,7 +56,7 @@ def panes(rows: tuple[tuple[float, int, tuple[float, ...], float], ...]) -> Surf
 
 
 def shown(
-    surfaces: Surfaces, camera: Camera, eye: Floats, ahead: Floats, alpha: Floats | None = None
+    surfaces: Surfaces, camera: RayCamera, eye: Floats, ahead: Floats, alpha: Floats | None = None
 ) -> Floats:
     """(n, 3) colours of the pixels of a view, of textures with ``alpha`` (T,), before 200."""
 
@@ -64,7 +64,7 @@ def shown(
         return np.where((sight.triangle < 0)[:, None], 200, 255 * surfaces.color[sight.triangle])
 
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, eye, ahead)
-    sight, layers = Layers(surfaces).before(
+    sight, layers = Layers(surfaces).split(
         sight, lambda at: np.ones(0) if alpha is None else alpha[at.triangle]
     )
     result = colors(sight)
@@ -76,7 +76,9 @@ def shown(
 def test_panes_blend_the_farthest_first(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a wall, panes behind it are not seen; nor are those that face away."""
     monkeypatch.setattr("ptmtools.rendering.layers._BATCH", 7)
-    actual = shown(panes(PANES[:count]), Camera(6, 4, 1.2, 1.5), np.array([0.1, 0.2, 0.0]), AHEAD)
+    actual = shown(
+        panes(PANES[:count]), RayCamera(6, 4, 1.2, 1.5), np.array([0.1, 0.2, 0.0]), AHEAD
+    )
     behind = 0.5 * (255 if count > 3 else 200)
     expected = 0.75 * np.array([behind, behind + 127.5, behind]) + 0.25 * np.array([255, 0, 0])
     np.testing.assert_allclose(actual, np.repeat(expected[None], 24, axis=0))
@@ -92,7 +94,7 @@ def test_a_pane_counts_once_for_rays_that_graze_it(faces: int) -> None:
     surfaces = panes(PANES[:1] * len(corner))
     surfaces = replace(surfaces, corner=corner, two_sided=np.full(len(corner), faces == 1))
     eye, ahead = turn @ [0, 0.2, 600], turn @ [0, 0, -1]
-    actual = shown(surfaces, Camera(320, 180, 1.2, 1.78), eye, ahead)
+    actual = shown(surfaces, RayCamera(320, 180, 1.2, 1.78), eye, ahead)
     times = np.log(actual[:, 1] / 200) / np.log(0.75)
     counts = np.unique_counts(times.round(6) + 0.0)
     assert {*counts.values.tolist()} == {0, 1, 2}
@@ -115,7 +117,7 @@ def test_leaves_in_a_large_building_have_no_holes(span: float) -> None:
         transparent=np.arange(81) < 80,
     )
     one = replace(surfaces, two_sided=np.ones(81, np.bool_))
-    camera = Camera(160, 120, 0.8, 4 / 3)
+    camera = RayCamera(160, 120, 0.8, 4 / 3)
     pairs, both = (shown(each, camera, np.zeros(3), AHEAD) for each in (surfaces, one))
     assert (both == 0).all(axis=1).sum() > 3000
     np.testing.assert_array_equal(pairs, both)
@@ -127,7 +129,7 @@ def test_insulating_glass_is_met_wherever_others_are(moved: float) -> None:
     surfaces = panes((*rows, (3.0, 2, (1.0, 1.0, 1.0), 1.0)))
     eye = np.array([moved, 0, -moved])
     surfaces = replace(surfaces, corner=surfaces.corner + eye)
-    actual = shown(surfaces, Camera(6, 4, 1.2, 1.5), eye, AHEAD)
+    actual = shown(surfaces, RayCamera(6, 4, 1.2, 1.5), eye, AHEAD)
     np.testing.assert_allclose(actual, 255 / 16)
 
 
@@ -135,7 +137,7 @@ def test_pairs_of_faces_that_almost_touch_are_two() -> None:
     """The front of the first is not taken for that of the second."""
     colors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     rows = [(2 + 0.0003 * k, side, colors[k], 0.5) for k in (0, 1) for side in (-1, 1)]
-    actual = shown(panes(tuple(rows)), Camera(6, 4, 1.2, 1.5), np.zeros(3), AHEAD)
+    actual = shown(panes(tuple(rows)), RayCamera(6, 4, 1.2, 1.5), np.zeros(3), AHEAD)
     np.testing.assert_allclose(actual, np.tile([50 + 127.5, 50 + 63.75, 50], (24, 1)))
 
 
@@ -147,7 +149,7 @@ def test_panes_in_the_plane_of_a_wall_and_of_no_alpha_are_left_out() -> None:
     # Other corners in the same plane, of other rounding.
     corner = surfaces.corner * [[[1, 1, 1]], [[0.9, 0.7, 1]], [[1, 1, 1]]]
     surfaces = replace(surfaces, corner=corner @ turn.T)
-    actual = shown(surfaces, Camera(60, 40, 1.2, 1.5), np.zeros(3), turn @ AHEAD)
+    actual = shown(surfaces, RayCamera(60, 40, 1.2, 1.5), np.zeros(3), turn @ AHEAD)
     np.testing.assert_array_equal(actual, 255)
 
 
@@ -160,9 +162,9 @@ def test_layers_are_painted_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> No
         sizes.append(len(sight.ray))
         return surfaces.color[sight.triangle]
 
-    camera = Camera(6, 4, 1.2, 1.5)
+    camera = RayCamera(6, 4, 1.2, 1.5)
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, np.zeros(3), AHEAD)
-    sight, layers = Layers(surfaces).before(sight, lambda at: np.ones(len(at.ray)))
+    sight, layers = Layers(surfaces).split(sight, lambda at: np.ones(len(at.ray)))
     blend(layers, sight, colors, np.zeros((24, 3)))
     assert sizes == [3, 3, 7, 7, 7, 7, 7, 7]
     assert sum(array.nbytes for layer in layers for array in layer) == 12 * 2 * 24
@@ -172,9 +174,9 @@ def test_light_falls_with_the_angle() -> None:
     """On layers without texture, as on surfaces."""
     surfaces = panes(PANES[:1])
     served: Any = SimpleNamespace(surfaces=surfaces, cell_count=1, index={"textures": []})
-    painter = Painter(served, max_side=0, lit=False, progress=silent)
-    sight = Caster(surfaces).look(Camera(5, 5, 1.2, 1.0), np.zeros(3), AHEAD)
-    sight, layers = Layers(surfaces).before(sight, painter.alpha)
+    painter = SurfacePainter(served, max_side=0, lit=False, progress=silent)
+    sight = Caster(surfaces).look(RayCamera(5, 5, 1.2, 1.0), np.zeros(3), AHEAD)
+    sight, layers = Layers(surfaces).split(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))
     actual = np.zeros((25, 3))
     blend(layers, sight, painter.colors, actual)
@@ -216,7 +218,7 @@ def test_textures_with_alpha_against_a_loop(seed: int) -> None:
         transparent=own,
         cutoff=np.array([*cutoff, 0]),
     )
-    actual = shown(surfaces, Camera(3, 2, 1.0, 1.5), np.zeros(3), AHEAD, np.array([*alpha, 1]))
+    actual = shown(surfaces, RayCamera(3, 2, 1.0, 1.5), np.zeros(3), AHEAD, np.array([*alpha, 1]))
     expected = np.full(3, 127.5)
     for k in reversed(range(len(rows))):
         _, side, color, share = rows[k]
@@ -232,5 +234,5 @@ def test_textures_with_alpha_against_a_loop(seed: int) -> None:
 
 def test_what_follows_too_many_layers_is_left_out() -> None:
     rows = tuple((1 + 0.01 * k, 2, (0.0, 0.0, 0.0), 0.004) for k in range(MOST + 20))
-    actual = shown(panes(rows), Camera(1, 1, 1.0, 1.0), np.zeros(3), AHEAD)
+    actual = shown(panes(rows), RayCamera(1, 1, 1.0, 1.0), np.zeros(3), AHEAD)
     np.testing.assert_allclose(actual, 200 * (1 - 0.004) ** MOST, atol=1e-3)

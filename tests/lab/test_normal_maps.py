@@ -16,7 +16,7 @@ from ptmtools.output.served import Served, read_served
 from ptmtools.output.surfaces import bumps_of
 from ptmtools.pipeline.build import build_scene
 from ptmtools.rendering.drawing import ViewOptions, draw_view
-from ptmtools.rendering.light import AMBIENT, LAMP, lit
+from ptmtools.rendering.light import AMBIENT, LAMP, with_lamp
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import read_walk
 from ptmtools_lab.catalogue import NORMALS
@@ -165,7 +165,7 @@ def test_lit_walks_show_the_maps_of_objects(tmp_path: Path) -> None:
     assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
     walk = ["path", str(db), "-o", str(tmp_path / "walk.json"), "--duration", "2"]
     assert main(["-q", *walk]) == 0
-    served = lit(read_served(db))
+    served = with_lamp(read_served(db))
     relief = relief_of(served, read_pyramids(served))
     world = prepare(served, read_walk(tmp_path / "walk.json"), rate=1, relief=relief)
     flat = replace(served, surfaces=replace(served.surfaces, relief=None))

@@ -14,7 +14,7 @@ from PIL import Image
 from ptmtools.errors import MissingComponentError
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.lossy import no_previews
-from ptmtools.rendering.rays import Camera
+from ptmtools.rendering.rays import RayCamera
 from ptmtools.rendering.records import Pyramids
 from ptmtools_lab import measures as flips
 from ptmtools_lab.comparing import SimulateOptions, play
@@ -60,7 +60,7 @@ def card() -> Any:
         relief=None,
         pyramids=textures,
         lossy=no_previews(1),
-        camera=Camera(2, 1, np.pi / 2, 2.0),
+        camera=RayCamera(2, 1, np.pi / 2, 2.0),
         catalogue=SimpleNamespace(cell_count=1, levels=np.array([2])),
         shows=None,
     )

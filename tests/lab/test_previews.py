@@ -21,9 +21,10 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import DatabaseError
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
-from ptmtools.rendering.lossy import Lossy, pictures, read_lossy
+from ptmtools.rendering.lossy import pictures, read_lossy
 from ptmtools.rendering.previews import read_preview
-from ptmtools.rendering.pyramids import packed, read_pyramids
+from ptmtools.rendering.pyramids import pack_pyramids, read_pyramids
+from ptmtools.rendering.records import Lossy
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools.texture import decode, encode, read_header
 from ptmtools.walk import read_walk
@@ -327,7 +328,7 @@ def lossy_of(made: Any, random: np.random.Generator) -> Lossy:
             state.append(following)
             following += level + 1
         first.append(len(chains))
-    return Lossy(packed(chains), np.array(first), np.array(state, dtype=np.int64))
+    return Lossy(pack_pyramids(chains), np.array(first), np.array(state, dtype=np.int64))
 
 
 @settings(max_examples=10)

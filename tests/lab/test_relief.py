@@ -19,9 +19,9 @@ from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
-from ptmtools.rendering.light import AMBIENT, lamps, lit
+from ptmtools.rendering.light import AMBIENT, lamps, with_lamp
 from ptmtools.rendering.pyramids import read_pyramids
-from ptmtools.rendering.rays import Camera
+from ptmtools.rendering.rays import RayCamera
 from ptmtools.walk import read_walk
 from ptmtools_lab.client import Client, Kind, Range
 from ptmtools_lab.comparing import SimulateOptions, budget_of, play, require_hints
@@ -59,7 +59,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def world_of(folder: Path, *, against: bool = False, rate: float = 1.0) -> World:
-    served, plain = (lit(read_served(folder / name)) for name in ("light.db", "plain.db"))
+    served, plain = (with_lamp(read_served(folder / name)) for name in ("light.db", "plain.db"))
     pyramids = read_pyramids(served)
     relief = relief_of(served, pyramids, plain if against else None)
     walk = read_walk(folder / "walk.json")
@@ -202,7 +202,7 @@ def test_everything_there_is_the_full_picture(world: World, compared: World) -> 
 
 def test_a_database_compared_with_itself(made: Path) -> None:
     """Nothing is wrong with it that is not without the comparison."""
-    served = lit(read_served(made / "plain.db"))
+    served = with_lamp(read_served(made / "plain.db"))
     pyramids, walk = read_pyramids(served), read_walk(made / "walk.json")
     alone = prepare(served, walk, pyramids, rate=0.5)
     relief = relief_of(served, pyramids, served)
@@ -311,7 +311,7 @@ def test_the_transmission_pauses_where_nodes_are_pixels(world: World) -> None:
     surfaces = world.served.surfaces
     own = surfaces.corner[relief.octrees.of == number].reshape(-1, 3) + world.served.index["origin"]
     gap = np.maximum(np.maximum(own.min(axis=0) - eye, eye - own.max(axis=0)), 0)
-    pixel = np.linalg.norm(gap) * Camera(1, 1, coarse.camera.field_of_view, 1, 40).pixel
+    pixel = np.linalg.norm(gap) * RayCamera(1, 1, coarse.camera.field_of_view, 1, 40).pixel
     nodes = relief.octrees.side[number] / pixel
     expected = int(np.ceil(np.log2(nodes))) + 1
     assert 1 < expected < relief.octrees.levels[number]

@@ -14,13 +14,13 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.output.locating import Locator
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.kernels import GREY, level_of_detail
-from ptmtools.rendering.rays import LINES, Camera, Frustum
+from ptmtools.rendering.rays import LINES, Frustum, RayCamera
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import gradients
 from ptmtools_lab.tables import look
 from tests.lab.worlds import SEEDS, leaf
 
-CAMERA = Camera(16, 10, 1.0, 1.6)
+CAMERA = RayCamera(16, 10, 1.0, 1.6)
 #: Rays that pass so near to an edge, in its triangle's own coordinates, could meet either side.
 EDGE = 1e-4
 #: Panels of two opposite faces in one plane.
@@ -273,7 +273,7 @@ def test_what_reaches_into_the_frustum(seed: int) -> None:
     right /= np.linalg.norm(right)
     up, tall = np.cross(right, ahead), np.tan(angle / 2)
     meets = frustum.meets_boxes(low, high)
-    covered, distance = frustum.covered(low, high), frustum.distance(low, high)
+    covered, distance = frustum.covered_shares(low, high), frustum.distance(low, high)
     for k in range(len(low)):
         corner = np.array(leaf(low[k], high[k])["points"]) - eye
         depth = corner @ ahead

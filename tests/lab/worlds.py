@@ -14,7 +14,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.rendering.rays import Camera, Frustum
+from ptmtools.rendering.rays import Frustum, RayCamera
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools_lab.catalogue import Catalogue, Shapes
 from ptmtools_lab.meshes import Meshes, meshes_of
@@ -27,7 +27,7 @@ from ptmtools_lab.world import STILL_SECONDS, World
 #: Metres of a room along x, up and along z.
 ROOM = np.array([4.0, 3.0, 4.0])
 RATE = 5.0
-CAMERA = Camera(8, 6, 1.0472, 1.5)
+CAMERA = RayCamera(8, 6, 1.0472, 1.5)
 _BOX = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=np.float64)
 #: The faces of a box whose corners are numbered as in ``_BOX``, outward.
 _FACES = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.light.occlusion import Surroundings
+from ptmtools.light.occlusion import Occluders
 from tests.systems.campus.models import house, level
 
 
@@ -24,9 +24,9 @@ def indexed(corner: Floats) -> tuple[Floats, np.ndarray]:
     return points, place.reshape(-1, 3).astype(np.int32)
 
 
-def surroundings(*parts: Floats) -> Surroundings:
+def surroundings(*parts: Floats) -> Occluders:
     points, triangles = indexed(np.concatenate(parts))
-    return Surroundings(points, triangles, points.mean(axis=0), 0.0, 1e-4)
+    return Occluders(points, triangles, points.mean(axis=0), 0.0, 1e-4)
 
 
 def quad(*corner: tuple[float, float, float]) -> Floats:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.cells import ABOVE, Baking, CellLight, Piece, encoded, exposed
+from ptmtools.light.cells import ABOVE, CellLight, LightBaking, encode, expose
 from ptmtools.light.lightmap import vertex_light
-from ptmtools.light.looks import Rays
+from ptmtools.light.looks import RayLight
+from ptmtools.light.model import CellSurfaces
 from ptmtools.light.occlusion import light, normals, turns
 from ptmtools.light.options import LightOptions
 from tests.light.shapes import bilinear, quad, surroundings
@@ -35,14 +36,14 @@ def room() -> Floats:
 def baked(corner: Floats, *, side: int = 1, around: Floats | None = None) -> CellLight:
     """The light of faces, of one object, among others."""
     others = np.zeros((0, 3, 3)) if around is None else around
-    baking = Baking(surroundings(corner, others), LightOptions("bake", light_samples=256))
+    baking = LightBaking(surroundings(corner, others), LightOptions("bake", light_samples=256))
     return baking.light(piece(corner, side))
 
 
-def piece(corner: Floats, side: int = 1, *, dense: bool = False) -> Piece:
+def piece(corner: Floats, side: int = 1, *, dense: bool = False) -> CellSurfaces:
     count = len(corner)
     zeros = np.zeros(count, np.int64)
-    return Piece(
+    return CellSurfaces(
         corner.astype(np.float32),
         zeros,
         zeros,
@@ -83,7 +84,7 @@ def test_a_texel_has_the_light_of_its_place() -> None:
     around = surroundings(corner)
     expected = light(around, point, normals(corner)[face], turns(300), 4096, 3.0, ABOVE)
     actual = [at(result, int(f), tuple(s)) for f, s in zip(face, share, strict=True)]
-    assert np.abs(exposed(expected) - actual).mean() < 0.02
+    assert np.abs(expose(expected) - actual).mean() < 0.02
 
 
 def test_the_front_the_back_or_the_more_open_side() -> None:
@@ -118,18 +119,20 @@ def test_dense_objects_have_light_at_vertices() -> None:
     floor = np.concatenate(halves)
     box = quad((3, 0, 3), (3, 0, 6), (3, 3, 6), (3, 3, 3))
     around, options = surroundings(floor, box), LightOptions("bake")
-    result = Baking(around, options).light(piece(floor, dense=True))
+    result = LightBaking(around, options).light(piece(floor, dense=True))
     assert result.texels is None
     assert not result.mapped.any()
     near = np.abs(floor[..., 0] - 3.05) < 0.1
     assert result.vertex[near & (floor[..., 2] > 3.5)].mean() < 200
     assert result.vertex[floor[..., 0] < 0.1].mean() > 230
-    half = Rays(around, floor, options.light_samples // 2, options.light_reach, above=ABOVE)
-    assert (result.vertex == encoded(vertex_light(half, floor, normals(floor)))).all()
+    half = RayLight(around, floor, options.light_samples // 2, options.light_reach, above=ABOVE)
+    assert (result.vertex == encode(vertex_light(half, floor, normals(floor)))).all()
 
 
 def test_a_cell_without_surfaces() -> None:
-    result = Baking(surroundings(room()), LightOptions("bake")).light(piece(np.zeros((0, 3, 3))))
+    result = LightBaking(surroundings(room()), LightOptions("bake")).light(
+        piece(np.zeros((0, 3, 3)))
+    )
     assert result.texels is None
     assert not len(result.mapped)
 
@@ -141,7 +144,7 @@ def test_light_does_not_lead_over_edges_or_to_the_other_side() -> None:
     behind = quad((-9, -9, -0.3), (15, -9, -0.3), (15, 15, -0.3), (-9, 15, -0.3))
     corner = np.concatenate([low, high])
     faces = replace(piece(corner), side=np.array([1, 1, -1, -1], np.int8))
-    baking = Baking(surroundings(corner, behind), LightOptions("bake", light_samples=256))
+    baking = LightBaking(surroundings(corner, behind), LightOptions("bake", light_samples=256))
     result = baking.light(faces)
     assert at(result, 2, MIDDLE) < 0.4
     for share in ((0, 0.5, 0.5), (0, 0.1, 0.9), (0.01, 0.495, 0.495)):  # at the edge between them

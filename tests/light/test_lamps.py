@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.cells import ABOVE, WHITE, Baking, CellLight, encoded, exposed
+from ptmtools.light.cells import ABOVE, WHITE, CellLight, LightBaking, encode, expose
 from ptmtools.light.lamps import (
     _BOTH,
     _MOST,
@@ -19,15 +19,15 @@ from ptmtools.light.lamps import (
     _SPOT,
     _SUN,
     Lamps,
-    _joined,
-    direct,
-    glowing,
+    _merge,
+    direct_light,
+    lamp_luminance,
+    lamps_near,
     lamps_of,
-    measured,
-    near,
+    measure_lamps,
 )
-from ptmtools.light.looks import Rays
-from ptmtools.light.mixing import Mix, mixed
+from ptmtools.light.looks import RayLight
+from ptmtools.light.mixing import LightMix, light_mix
 from ptmtools.light.occlusion import light_and_sky, points_on, turns
 from ptmtools.light.options import LightOptions
 from ptmtools.scene.lights import Lamp, Lights
@@ -50,7 +50,7 @@ def received(lamps: Lamps, point: Floats, *walls: Floats, rays: int = 64) -> Flo
     """The light on level places."""
     normal = np.broadcast_to(UP, (len(point), 3)).copy()
     around = surroundings(NOWHERE, *walls)
-    return direct(around, lamps, point, normal, turns(len(point)), rays)
+    return direct_light(around, lamps, point, normal, turns(len(point)), rays)
 
 
 def scene_of(corner: Floats, lamp_faces: int, *, two_sided: bool = False) -> Scene:
@@ -103,7 +103,7 @@ def many_lamps(count: int) -> Lamps:
 def test_too_many_lamps_join_and_light_about_as_before(kind: int) -> None:
     lamps = many_lamps(40_000)
     lamps = lamps.only(lamps.kind == kind)
-    joined = _joined(lamps)
+    joined = _merge(lamps)
     assert len(lamps) > 2 * _MOST
     assert 50 < len(joined) <= _MOST
     assert joined.power.sum() == pytest.approx(lamps.power.sum())
@@ -115,7 +115,7 @@ def test_too_many_lamps_join_and_light_about_as_before(kind: int) -> None:
 def test_few_lamps_are_as_they_are_and_dark_ones_are_left_out() -> None:
     lamps = many_lamps(_MOST)
     lamps.power[:100] = 0
-    joined = _joined(lamps)
+    joined = _merge(lamps)
     assert np.array_equal(joined.place, lamps.place[100:])
     assert np.array_equal(joined.power, lamps.power[100:])
 
@@ -127,7 +127,7 @@ def test_lamps_of_unlike_kinds_and_ways_stay_apart() -> None:
     turned.way[:, 1] *= -1
     pairs = zip(vars(lamps).values(), vars(turned).values(), strict=True)
     up = Lamps(*map(np.concatenate, pairs))
-    joined = _joined(up)
+    joined = _merge(up)
     for kind in (_POINT, _SPOT, _SUN):
         own, before = joined.only(joined.kind == kind), up.only(up.kind == kind)
         assert own.power.sum() == pytest.approx(before.power.sum())
@@ -170,10 +170,10 @@ def test_a_rectangle_that_glows_as_its_formula_says() -> None:
     assert received(lamps, np.array([[-3.0, 0, 0]]), panel) == pytest.approx(beside, rel=0.03)
     above = np.array([[0.5, 3.0, 0.3]])
     down = -UP
-    assert direct(surroundings(NOWHERE), lamps, above, down, turns(1), 64) == 0
+    assert direct_light(surroundings(NOWHERE), lamps, above, down, turns(1), 64) == 0
     both = lamps_of(replace(scene, two_sided=np.ones(4, bool)), shining(5.0))
     assert set(both.kind) == {_BOTH}
-    assert direct(surroundings(NOWHERE), both, above, down, turns(1), 64) > 1
+    assert direct_light(surroundings(NOWHERE), both, above, down, turns(1), 64) > 1
 
 
 def test_a_wall_shades_a_lamp() -> None:
@@ -247,7 +247,7 @@ def test_lamps_that_matter_are_kept() -> None:
         np.ones((count, 2)),
     )
     floor = quad((0, 0, 0), (0, 0, 4), (4, 0, 4), (4, 0, 0))
-    kept = near(lamps, floor)
+    kept = lamps_near(lamps, floor)
     assert 0 < len(kept) < count / 2
     point = points_on(floor[:1].repeat(50, axis=0), np.arange(50))
     assert received(kept, point, rays=512) == pytest.approx(
@@ -262,7 +262,7 @@ def test_each_kind_is_measured_by_its_own_light() -> None:
     both = Lamps(*(np.concatenate(pair) for pair in pairs))
     point = np.random.default_rng(0).random((301, 3)) * [6, 0, 6]
     normal = np.tile(UP, (301, 1))
-    result = measured(surroundings(NOWHERE), both, point, normal, turns(301), 64)
+    result = measure_lamps(surroundings(NOWHERE), both, point, normal, turns(301), 64)
     for kind in (_SUN, _POINT):
         own = result.only(result.kind == kind)
         assert np.median(received(own, point)) == pytest.approx(1)
@@ -270,9 +270,9 @@ def test_each_kind_is_measured_by_its_own_light() -> None:
 
 def test_what_glows_a_little_or_everywhere_is_no_lamp() -> None:
     faces = room()
-    assert glowing(scene_of(faces, 2), shining(0.05)).tolist() == [0, 0]
-    assert glowing(scene_of(faces, 2), shining(0.5)).tolist() == [0, 0.5]
-    assert glowing(scene_of(faces, 8), shining(0.5)).tolist() == [0, 0]
+    assert lamp_luminance(scene_of(faces, 2), shining(0.05)).tolist() == [0, 0]
+    assert lamp_luminance(scene_of(faces, 2), shining(0.5)).tolist() == [0, 0.5]
+    assert lamp_luminance(scene_of(faces, 8), shining(0.5)).tolist() == [0, 0]
 
 
 WINDOW = 2.0, 4.0, 1.0, 2.5  # from, to along x; from, to in height
@@ -315,33 +315,33 @@ def test_the_sky_through_a_window_as_its_formula_says() -> None:
 BAKE = LightOptions("bake", light_samples=256)
 
 
-def lit_room(corner: Floats, lights: Lights | None = None) -> tuple[CellLight, Mix]:
+def lit_room(corner: Floats, lights: Lights | None = None) -> tuple[CellLight, LightMix]:
     """The light of a room, of which what glows has none of its own."""
     lamp_faces = 2 if lights is not None and lights.glow.any() else 0
     scene, around = scene_of(corner, lamp_faces), surroundings(corner)
     own = piece(corner)
     own.glass[len(corner) - lamp_faces :] = True
-    mix = mixed(around, [own], lamps_of(scene, lights), BAKE, ABOVE, WHITE)
-    return Baking(around, BAKE, mix).light(own), mix
+    mix = light_mix(around, [own], lamps_of(scene, lights), BAKE, ABOVE, WHITE)
+    return LightBaking(around, BAKE, mix).light(own), mix
 
 
 def test_a_closed_room_without_lamps_is_as_by_ambient_light_alone() -> None:
     result, mix = lit_room(room())
-    assert mix == Mix()
+    assert mix == LightMix()
     assert np.array_equal(
-        result.texels, Baking(surroundings(room()), BAKE).light(piece(room())).texels
+        result.texels, LightBaking(surroundings(room()), BAKE).light(piece(room())).texels
     )
 
 
 def test_a_room_is_brighter_near_its_window() -> None:
     result, mix = lit_room(windowed())
-    plain = Baking(surroundings(windowed()), BAKE).light(piece(windowed()))
+    plain = LightBaking(surroundings(windowed()), BAKE).light(piece(windowed()))
     assert mix.sky
     assert mix.slope < 1
     near_it, far_off = (1, (0.5, 0.25, 0.25)), (0, (0.1, 0.4, 0.5))  # 1.5 m and 5.4 m away
     assert at(result, *near_it) == pytest.approx(at(plain, *near_it), abs=0.1)
     assert at(result, *far_off) < 0.95 * at(plain, *far_off)
-    rays = Rays(surroundings(windowed()), windowed(), 1024, 3.0, above=ABOVE)
+    rays = RayLight(surroundings(windowed()), windowed(), 1024, 3.0, above=ABOVE)
     point = np.array([[3.0, 0, z] for z in (1.0, 1.5, 2, 2.5, 3, 4)])
     gain = mix.look(rays)(np.zeros(6, int), point, turns(6)) / rays(
         np.zeros(6, int), point, turns(6)
@@ -354,10 +354,10 @@ def test_a_room_is_brighter_near_its_window() -> None:
 
 def test_a_wall_without_windows_is_about_as_bright_beside_the_brightest_of_rooms() -> None:
     wall = np.array([0.67], np.float32)
-    most = Mix(slope=(WHITE - 0.57) / (3.0 - 0.57))  # ambient light, the sky, and lamps
-    assert exposed(most.shown(wall)) > 0.9 * exposed(wall)
-    assert np.diff(most.shown(np.linspace(0, 3, 50, dtype=np.float32))).min() > 0
-    assert most.shown(np.array([3.0], np.float32)) == pytest.approx(WHITE)
+    most = LightMix(slope=(WHITE - 0.57) / (3.0 - 0.57))  # ambient light, the sky, and lamps
+    assert expose(most.tone(wall)) > 0.9 * expose(wall)
+    assert np.diff(most.tone(np.linspace(0, 3, 50, dtype=np.float32))).min() > 0
+    assert most.tone(np.array([3.0], np.float32)) == pytest.approx(WHITE)
 
 
 def test_a_lamp_in_one_corner_lights_what_it_sees() -> None:
@@ -377,5 +377,5 @@ def test_a_lamp_in_one_corner_lights_what_it_sees() -> None:
 def test_more_of_a_lamp_is_never_darker_nor_is_anything_black() -> None:
     x = np.linspace(0, 50, 200)
     total = 0.3 + x / (1 + x)
-    assert (np.diff(encoded(0.6 * total).astype(int)) >= 0).all()
-    assert encoded(np.zeros(1)) > 20
+    assert (np.diff(encode(0.6 * total).astype(int)) >= 0).all()
+    assert encode(np.zeros(1)) > 20

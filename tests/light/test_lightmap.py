@@ -8,8 +8,8 @@ from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.light.atlas import cover, unwrap
-from ptmtools.light.lightmap import AGREE, _enlarged, bake, fill, smoothed, vertex_light
-from ptmtools.light.looks import LightImage, Painted, Rays
+from ptmtools.light.lightmap import AGREE, _enlarge, bake, fill, smooth, vertex_light
+from ptmtools.light.looks import LightImage, PaintedLight, RayLight
 from ptmtools.light.occlusion import normals
 from ptmtools.scene.source import SourceWrap
 from tests.light import filters
@@ -37,7 +37,7 @@ def test_thin_faces_show_their_own_light() -> None:
     atlas = unwrap(*indexed(corner), sizes)
     where = surroundings(corner, GROUND)
     face, point, at = samples(corner, atlas.uv, 4000)
-    light = Rays(where, corner, 256, 0.2)
+    light = RayLight(where, corner, 256, 0.2)
     wanted = light(face, point, np.zeros(len(face)))
     assert np.ptp(wanted) > 0.5
     maps = bake(light, corner, atlas, light.grain, sizes)
@@ -49,7 +49,7 @@ def test_a_lightmap_of_a_house_on_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles, SIZES)
     where = surroundings(HOUSE, GROUND)
-    look = Rays(where, HOUSE, 64, 20.0)
+    look = RayLight(where, HOUSE, 64, 20.0)
     maps = bake(look, HOUSE, atlas, look.grain, SIZES)
     assert [len(m.value) for m in maps] == [512, 1024, 2048]
     normal = normals(HOUSE)
@@ -70,7 +70,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles, SIZES)
     where = surroundings(HOUSE, GROUND)
-    look = Rays(where, HOUSE, 64, 20.0)
+    look = RayLight(where, HOUSE, 64, 20.0)
     (taken,) = bake(look, HOUSE, atlas, look.grain, (512,))
 
     def nothing(
@@ -78,7 +78,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     ) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
 
-    monkeypatch.setattr("ptmtools.light.lightmap._enlarged", nothing)
+    monkeypatch.setattr("ptmtools.light.lightmap._enlarge", nothing)
     (whole,) = bake(look, HOUSE, atlas, look.grain, (512,))
     assert whole.computed == whole.covered
     assert taken.computed < 0.05 * whole.computed
@@ -99,14 +99,14 @@ def test_filters_are_those_of_arrays(seed: int, side: int, grain: float) -> None
     larger[other] = random.integers(-1, 2, other.sum(), np.int32)
     centred = random.random(value.shape) < 0.7
     for one, plain in zip(
-        _enlarged(value, chart, centred, larger),
+        _enlarge(value, chart, centred, larger),
         filters.enlarged(value, chart, centred, larger),
         strict=True,
     ):
         np.testing.assert_array_equal(one, plain)
     row, column = np.nonzero(chart >= 0)
     np.testing.assert_array_equal(
-        smoothed(value, chart, row, column, np.float32(grain)),
+        smooth(value, chart, row, column, np.float32(grain)),
         filters.smoothed(value, chart, row, column, grain),
     )
 
@@ -116,7 +116,7 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles, SIZES)
     where = surroundings(HOUSE, GROUND)
-    look = Rays(where, HOUSE, 64, 20.0)
+    look = RayLight(where, HOUSE, 64, 20.0)
     (actual,) = bake(look, HOUSE, atlas, look.grain, (512,))
     assert actual.value.min() > 0.4
 
@@ -179,7 +179,7 @@ def test_vertices_carry_the_light_of_their_faces() -> None:
 
 def test_a_corner_does_not_blacken_its_faces() -> None:
     where = surroundings(HOUSE, GROUND)
-    look = Rays(where, HOUSE, 64, 20.0)
+    look = RayLight(where, HOUSE, 64, 20.0)
     actual = vertex_light(look, HOUSE, normals(HOUSE))
     roof = normals(HOUSE)[:, 1] > 0.9
     assert actual[roof].min() > 0.95
@@ -190,12 +190,12 @@ def test_the_models_own_light_is_looked_up() -> None:
     corner = triangles_of(level((0, 0), (10, 10), 0))
     uv = np.stack([corner[..., 0] / 10, corner[..., 2] / 10], axis=2)
     image = LightImage(np.tile(np.linspace(0, 255, 64).astype(np.uint8), (64, 1)), CLAMPED)
-    look = Painted(corner, uv, np.zeros(2, np.int32), (image,), np.arange(2))
+    look = PaintedLight(corner, uv, np.zeros(2, np.int32), (image,), np.arange(2))
     point = np.array([[2.0, 0, 3], [8, 0, 7]])
     face = np.array([1 if z > x else 0 for x, _, z in point])
     actual = look(face, point, np.zeros(2))
     assert np.allclose(actual, [0.2, 0.8], atol=0.02)
-    white = Painted(corner, uv, np.full(2, -1, np.int32), (image,), np.arange(2))
+    white = PaintedLight(corner, uv, np.full(2, -1, np.int32), (image,), np.arange(2))
     assert (white(face, point, np.zeros(2)) == 1).all()
 
 
@@ -216,7 +216,7 @@ def test_the_models_own_light_goes_on_as_its_sampler_says(
     point = np.array([[1.25, 0, 1.25], [3.75, 0, 1.25], [6.25, 0, 1.25], [8.75, 0, 1.25]])
     for axis, image in ((0, texels), (2, texels.T[::-1])):
         uv = corner[..., [0, 2]] / 5
-        look = Painted(
+        look = PaintedLight(
             corner, uv, np.zeros(2, np.int32), (LightImage(image, (wrap, wrap)),), np.arange(2)
         )
         at = point if axis == 0 else point[:, ::-1]
@@ -232,6 +232,6 @@ def _face_of(corner: Floats, point: Floats) -> np.ndarray:
 def test_a_weaker_light_is_nearer_to_white() -> None:
     corner = triangles_of(level((0, 0), (10, 10), 0))
     image = LightImage(np.zeros((2, 2), np.uint8), strength=0.25)
-    look = Painted(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
+    look = PaintedLight(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
     actual = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
     assert actual[0] == pytest.approx(0.75)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.looks import Rays, open_sides, planes
-from ptmtools.light.occlusion import Surroundings, hemisphere, light, normals, turns
+from ptmtools.light.looks import RayLight, open_sides, planes
+from ptmtools.light.occlusion import Occluders, hemisphere, light, normals, turns
 from tests.light.shapes import prism, quad
 
 UP = np.array([[0.0, 1, 0]])
@@ -17,13 +17,13 @@ UP = np.array([[0.0, 1, 0]])
 FAR = 1e4
 
 
-def around(*parts: Floats, ground: float = -1.0) -> Surroundings:
+def around(*parts: Floats, ground: float = -1.0) -> Occluders:
     corner = np.concatenate(parts) if parts else np.zeros((0, 3, 3))
     triangles = np.arange(3 * len(corner), dtype=np.int32).reshape(-1, 3)
-    return Surroundings(corner.reshape(-1, 3), triangles, np.zeros(3), ground, 1e-4)
+    return Occluders(corner.reshape(-1, 3), triangles, np.zeros(3), ground, 1e-4)
 
 
-def seen(where: Surroundings, point: object, normal: Floats = UP, reach: float = inf) -> float:
+def seen(where: Occluders, point: object, normal: Floats = UP, reach: float = inf) -> float:
     at = np.array([point], float)
     return float(light(where, at, normal, np.zeros(1), 4096, reach)[0])
 
@@ -81,7 +81,7 @@ def test_the_lighter_side_counts() -> None:
     assert open_sides(where, mixed, np.ones(2, bool), 20.0).tolist() == [1, -1]
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
     for side, least, most in ((-1.0, 0.9, 1.0), (1.0, 0.0, 0.2)):
-        actual = Rays(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
+        actual = RayLight(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
         assert least <= actual <= most
 
 
@@ -138,8 +138,8 @@ def test_a_coarse_face_beneath_the_surface_has_its_light() -> None:
     assert (normals(sheet)[:, 1] > 0).all()
     where = around(FLOOR)
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
-    assert Rays(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
-    assert Rays(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
+    assert RayLight(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
+    assert RayLight(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
 
 
 def test_sight_ends_at_what_is_before_it() -> None:
@@ -167,7 +167,7 @@ def test_far_from_the_origin_it_is_the_same() -> None:
     actual = []
     for shift in (0.0, 1e7):
         moved = corner.reshape(-1, 3) + shift
-        where = Surroundings(moved, triangles, np.full(3, shift), shift - 1, 1e-4)
+        where = Occluders(moved, triangles, np.full(3, shift), shift - 1, 1e-4)
         at = np.array([[1.0, 0, 0]]) + shift
         actual.append(float(light(where, at, UP, np.zeros(1), 1024, inf)[0]))
     assert actual[0] == pytest.approx(actual[1], abs=0.01)

@@ -62,7 +62,7 @@ def test_a_crash_costs_another_attempt(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_crashes_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packing, "_received", lambda stream: None)
+    monkeypatch.setattr(packing, "_receive", lambda stream: None)
     with pytest.raises(WorkerError, match="xatlas crashes") as refused:
         pack(MESHES, 16.0, 1)
     assert refused.value.code == "PTM-W004"
@@ -98,7 +98,7 @@ packing._serve()
 
 def planted(monkeypatch: pytest.MonkeyPatch, *scripts: str) -> None:
     """Makes the next children run scripts."""
-    rest, start = list(scripts), packing._started
+    rest, start = list(scripts), packing._start
 
     def started() -> subprocess.Popen[bytes]:
         if not rest:
@@ -106,7 +106,7 @@ def planted(monkeypatch: pytest.MonkeyPatch, *scripts: str) -> None:
         command = [sys.executable, "-c", rest.pop(0)]
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
-    monkeypatch.setattr(packing, "_started", started)
+    monkeypatch.setattr(packing, "_start", started)
     monkeypatch.setattr(packing, "_child", None)
 
 

@@ -15,7 +15,7 @@ from ptmtools.meshopt.encoding import (
     encode_attributes,
     encode_triangles,
     exponential,
-    reordered,
+    reorder,
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -90,7 +90,7 @@ def test_triangles_come_back(peer: Any, seed: int) -> None:
 @given(SEEDS)
 def test_a_reordered_mesh_is_the_same(seed: int) -> None:
     triangle = meshes(np.random.default_rng(seed))
-    used, again = reordered(triangle)
+    used, again = reorder(triangle)
     assert canonical(used[again]) == canonical(triangle)
     first = np.unique(again.ravel(), return_index=True)[1]
     assert (np.diff(first) > 0).all()
@@ -101,7 +101,7 @@ def test_neighbours_follow_each_other() -> None:
     random = np.random.default_rng(5)
     corner = (np.arange(40)[:, None] * 41 + np.arange(40)).ravel()[:, None]
     grid = np.vstack([corner + [0, 1, 42], corner + [0, 42, 41]])
-    _, triangle = reordered(random.permutation(grid))
+    _, triangle = reorder(random.permutation(grid))
     assert len(encode_triangles(triangle)) < 1.2 * len(grid)
     assert len(encode_triangles(random.permutation(grid))) > 3 * len(grid)
 

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from ptmtools.coverage.options import AchOptions
-from ptmtools.light.budget import LEAST, SHARE, affordable, rounded
-from ptmtools.light.cells import Piece
+from ptmtools.light.cells import LEAST, SHARE, affordable_density, round_bytes
+from ptmtools.light.model import CellSurfaces
 from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stages import LIGHT, TEXTURES
@@ -26,40 +26,46 @@ QUICK = AchOptions(samples=1, backend="embree")
 AUTO = LightOptions(light_samples=4)
 
 
-def floor(side: float, **kind: bool) -> Piece:
+def floor(side: float, **kind: bool) -> CellSurfaces:
     """A square, `side` metres long."""
     corner = np.array([[[0, 0, 0], [0, 0, 1], [1, 0, 1]], [[0, 0, 0], [1, 0, 1], [1, 0, 0]]])
     none, zero = np.zeros(2, np.bool_), np.zeros(2, np.int64)
     flags = {name: ~none if kind.get(name) else none for name in ("glass", "dense")}
-    return Piece(
+    return CellSurfaces(
         (side * corner).astype(np.float32), zero, zero, **flags, side=np.ones(2, np.int8), face=zero
     )
 
 
 def test_lightmaps_fit_the_images() -> None:
     pieces = [floor(10.0), floor(10.0)]
-    whole = next(n for n in (1 << k for k in range(30)) if affordable(pieces, 10.0, n) == 10.0)
-    fewer = affordable(pieces, 10.0, whole // 2)
+    whole = next(
+        n for n in (1 << k for k in range(30)) if affordable_density(pieces, 10.0, n) == 10.0
+    )
+    fewer = affordable_density(pieces, 10.0, whole // 2)
     assert 10 * LEAST <= fewer < 10
     # A quarter of the bytes has a quarter of the texels.
     assert fewer == pytest.approx(10 * (whole / 2 / _enough(pieces)) ** 0.5, rel=1e-6)
-    assert affordable(pieces, 10.0, whole // 16) == 0
-    assert affordable(pieces, 10.0, 0) == 0
-    assert affordable([floor(1e-5)], 10.0, 1 << 20) == 0
-    assert affordable([floor(10.0, glass=True), floor(10.0, dense=True)], 10.0, 1 << 30) == 0
+    assert affordable_density(pieces, 10.0, whole // 16) == 0
+    assert affordable_density(pieces, 10.0, 0) == 0
+    assert affordable_density([floor(1e-5)], 10.0, 1 << 20) == 0
+    assert (
+        affordable_density([floor(10.0, glass=True), floor(10.0, dense=True)], 10.0, 1 << 30) == 0
+    )
 
 
-def _enough(pieces: list[Piece]) -> float:
+def _enough(pieces: list[CellSurfaces]) -> float:
     """The bytes of images beside which lightmaps have all texels, by bisection."""
     low, high = 1, 1 << 40
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if affordable(pieces, 10.0, middle) == 10.0 else (middle, high)
+        low, high = (
+            (low, middle) if affordable_density(pieces, 10.0, middle) == 10.0 else (middle, high)
+        )
     return high
 
 
 def test_bytes_are_rounded() -> None:
-    assert [rounded(n) for n in (0, 1, 2, 3, 1023, 1024, 1500)] == [0, 1, 2, 2, 512, 1024, 1024]
+    assert [round_bytes(n) for n in (0, 1, 2, 3, 1023, 1024, 1500)] == [0, 1, 2, 2, 512, 1024, 1024]
 
 
 def repaint(model: Path, side: int) -> int:

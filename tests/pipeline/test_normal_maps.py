@@ -12,7 +12,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.required_levels import Screen, unresolved_levels
+from ptmtools.coverage.required_levels import VisitorScreen, unresolved_levels
 from ptmtools.light.options import LightOptions
 from ptmtools.output.gltf_reader import ReadPrimitive, read_glb
 from ptmtools.output.names import HINTS
@@ -155,7 +155,7 @@ def test_trim_keeps_their_levels(made: Path) -> None:
     scene = artifacts[SCENE]
     sizes = [(65536, 65536)] * len(scene.images)
     levels = unresolved_levels(
-        scene, artifacts[CELLS], artifacts[PVS], sizes, Screen(100, 60.0, 0.5)
+        scene, artifacts[CELLS], artifacts[PVS], sizes, VisitorScreen(100, 60.0, 0.5)
     )
     of = {image.name: n for image, n in zip(scene.images, levels.tolist(), strict=True)}
     assert of["room_a.png"] > 0

@@ -19,7 +19,7 @@ from ptmtools.output.served import Served, read_served
 from ptmtools.rendering import pyramids
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.light import light_on
-from ptmtools.rendering.painting import Painter
+from ptmtools.rendering.painting import SurfacePainter
 from ptmtools.rendering.records import Sight
 from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.site.content import Site, SiteOptions, site_of
@@ -191,13 +191,13 @@ def test_the_page_shows_them(visit: Callable[..., Any], colored: Site, database:
 def test_renders_show_them(database: Path, lit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """No texture is decoded twice, and alpha is not in memory while colours are."""
     served, real, decoded = read_served(database), pyramids._levels, list[int]()
-    colors = Painter.colors
+    colors = SurfacePainter.colors
 
-    def painted(self: Painter, sight: Sight) -> np.ndarray:
+    def painted(self: SurfacePainter, sight: Sight) -> np.ndarray:
         assert not self._alpha
         return colors(self, sight)
 
-    monkeypatch.setattr(Painter, "colors", painted)
+    monkeypatch.setattr(SurfacePainter, "colors", painted)
 
     def levels(served: Served, texture: int) -> list[Any]:
         decoded.append(texture)

@@ -11,7 +11,7 @@ from ptmtools.cli.main import main
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.pyramids import read_pyramids
-from ptmtools.rendering.rays import Camera
+from ptmtools.rendering.rays import RayCamera
 from ptmtools.site.content import Site, site_of
 from ptmtools_lab.tables import look
 from tests.scene.bumpy import write_bumpy
@@ -108,7 +108,7 @@ def test_the_simulator_wants_the_same_levels(revisit: Visiting, site: Site, data
         actual = np.array(visitor.page.evaluate(row))[1:]
     eye, yaw = EYES[name]
     angle = served.index["viewpoints"][0]["fieldOfView"]
-    camera = Camera(WIDTH, HEIGHT, angle, WIDTH / HEIGHT, HEIGHT)
+    camera = RayCamera(WIDTH, HEIGHT, angle, WIDTH / HEIGHT, HEIGHT)
     turn = np.radians(yaw)
     direction = np.array([[-np.sin(turn), 0.0, -np.cos(turn)]])
     pyramids = read_pyramids(served)

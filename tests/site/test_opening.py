@@ -250,14 +250,14 @@ def test_steps_come_by_worth_per_byte() -> None:
 def test_it_sees_as_the_client(two_rooms: Path) -> None:
     """The needs are those of the simulator's own screen."""
     from ptmtools.rendering.pyramids import read_pyramids
-    from ptmtools.rendering.rays import Camera
+    from ptmtools.rendering.rays import RayCamera
     from ptmtools.site.opening import HEIGHT, WIDTH
     from ptmtools_lab.tables import look
 
     served = read_served(two_rooms)
     for viewpoint in served.index["viewpoints"]:
         eye, direction = (np.array([viewpoint[name]]) for name in ("position", "direction"))
-        camera = Camera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
+        camera = RayCamera(WIDTH, HEIGHT, viewpoint["fieldOfView"], WIDTH / HEIGHT)
         (views,) = look(served.surfaces, read_pyramids(served), camera, eye, direction)
         needs = NeedFinder(served).needs(viewpoint)
         for texture, share in needs.textures.items():

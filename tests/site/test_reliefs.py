@@ -11,7 +11,7 @@ from ptmtools.cli.main import main
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
 from tests.site.conftest import PLAIN, Visiting
@@ -56,7 +56,7 @@ def test_they_are_drawn_as_by_render(
     )
     expected = draw_view(served, options)
     view = eye_of(served, options)
-    camera = Camera(WIDTH, HEIGHT, view.field_of_view, WIDTH / HEIGHT, HEIGHT)
+    camera = RayCamera(WIDTH, HEIGHT, view.field_of_view, WIDTH / HEIGHT, HEIGHT)
     sight = Caster(served.surfaces).look(camera, view.position, view.direction)
     relief = served.surfaces.relief
     assert relief is not None

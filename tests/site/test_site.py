@@ -197,12 +197,12 @@ def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> No
     from ptmtools.output.served import read_served
     from ptmtools.rendering.kernels import shade
     from ptmtools.rendering.pyramids import read_pyramids
-    from ptmtools.rendering.rays import Camera, Caster
+    from ptmtools.rendering.rays import Caster, RayCamera
     from ptmtools.rendering.records import own_levels, triangles_of
 
     served = read_served(two_rooms)
     viewpoint = served.index["viewpoints"][0]
-    camera = Camera(160, 90, viewpoint["fieldOfView"], 16 / 9)
+    camera = RayCamera(160, 90, viewpoint["fieldOfView"], 16 / 9)
     eye, direction = (np.array(viewpoint[name]) for name in ("position", "direction"))
     sight = Caster(served.surfaces).look(camera, eye, direction)
     sight = sight._replace(pixel=2 * np.tan(camera.field_of_view / 2) / 90)

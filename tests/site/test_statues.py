@@ -13,7 +13,7 @@ from browser import hurried
 
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
-from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.site.client import OVERHEAD, SURROUNDINGS
 from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import Entry
@@ -59,7 +59,7 @@ def test_they_are_drawn_as_by_render(revisit: Visiting, site: Site, database: Pa
     )
     expected = draw_view(served, options)
     view = eye_of(served, options)
-    camera = Camera(WIDTH, HEIGHT, view.field_of_view, WIDTH / HEIGHT, HEIGHT)
+    camera = RayCamera(WIDTH, HEIGHT, view.field_of_view, WIDTH / HEIGHT, HEIGHT)
     sight = Caster(served.surfaces).look(camera, view.position, view.direction)
     shown = np.where(sight.triangle < 0, -1, served.surfaces.represented["octree"][sight.triangle])
     mask = inside = (shown == 1).reshape(HEIGHT, WIDTH)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.lazy import Lazy
 
 if TYPE_CHECKING:
-    from ptmtools.coverage.item_buffer import Renderer, Surfaces
+    from ptmtools.coverage.item_buffer import ItemRenderer, ItemSurfaces
 
 #: The choice of a backend by its expected cost.
 AUTO = "auto"
@@ -29,8 +29,8 @@ class Backend:
     ----------
     name: its name in ``--backend`` and in results.
     about: the library that it draws with, for help.
-    opener: (`Surfaces`, pixels a side of a view, number of a graphics device or None) → `Renderer`;
-        raises `MissingComponentError` where it cannot run.
+    opener: (`ItemSurfaces`, pixels a side of a view, number of a graphics device or None) →
+        `ItemRenderer`; raises `MissingComponentError` where it cannot run.
     coster: (triangles of a PVS, pixels of all views, number of a graphics device or None) → the
         processor time in µs that a sample point is expected to take, 0 on graphics hardware; raises
         as the opener. Depends on the machine and the arguments, never on the clock.
@@ -40,11 +40,11 @@ class Backend:
 
     name: str
     about: str
-    opener: Lazy[Callable[[Surfaces, int, int | None], Renderer]]
+    opener: Lazy[Callable[[ItemSurfaces, int, int | None], ItemRenderer]]
     coster: Lazy[Callable[[float, int, int | None], float]]
     in_processes: bool = False
 
-    def open(self, surfaces: Surfaces, face: int, gpu: int | None = None) -> Renderer:
+    def open(self, surfaces: ItemSurfaces, face: int, gpu: int | None = None) -> ItemRenderer:
         """A renderer, to be closed after use; see ``opener``."""
         return self.opener.load()(surfaces, face, gpu)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
+from ptmtools.coverage.item_buffer import BEFORE, VIEWS, ItemSurfaces
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.embree import ray_tree
 
@@ -36,13 +36,13 @@ def cost(_triangles: float, pixels: int, _gpu: int | None) -> float:
 class EmbreeRenderer:
     """Draws with Embree, which keeps the interpreter's lock: processes, not threads, add speed."""
 
-    def __init__(self, surfaces: Surfaces, face: int, _gpu: int | None = None) -> None:
+    def __init__(self, surfaces: ItemSurfaces, face: int, _gpu: int | None = None) -> None:
         """Builds the trees over ``surfaces``, for views of ``face`` pixels a side."""
         self._surfaces = surfaces
         self._face = face
         self.most = max(1, RAYS // (len(VIEWS) * face * face))
         layers = [surfaces.opaque] if surfaces.opaque.all() else [surfaces.opaque, ~surfaces.opaque]
-        self._trees = [_Tree(surfaces, np.flatnonzero(which)) for which in layers]
+        self._trees = [_RayTree(surfaces, np.flatnonzero(which)) for which in layers]
 
     @property
     def name(self) -> str:
@@ -61,7 +61,7 @@ class EmbreeRenderer:
         origin, along = (rays[pixels] for rays in self._rays(points))
         layers, depth = self._layers(origin, along)
         point = pixels // (len(VIEWS) * self._face**2)
-        exact = self._surfaces.normalised(points.position)[point]
+        exact = self._surfaces.normalise(points.position)[point]
         return layers, self._surfaces.world(exact + depth[..., None] * along)
 
     def _rays(self, points: SamplePoints) -> tuple[Singles, Singles]:
@@ -69,7 +69,7 @@ class EmbreeRenderer:
 
         count = len(points) * len(VIEWS) * self._face**2
         origin, along = (np.empty((count, 3), dtype=np.float32) for _ in range(2))
-        position = self._surfaces.normalised(points.position)
+        position = self._surfaces.normalise(points.position)
         cast_rays(position, points.shift / self._face, self._face, VIEWS, origin, along)
         return origin, along
 
@@ -90,10 +90,10 @@ class EmbreeRenderer:
         vars(self).clear()
 
 
-class _Tree:
+class _RayTree:
     """A committed Embree scene over some of the surfaces."""
 
-    def __init__(self, surfaces: Surfaces, which: Ints) -> None:
+    def __init__(self, surfaces: ItemSurfaces, which: Ints) -> None:
         self._which = np.append(which, -1).astype(np.int32)
         self._tree: Any = None
         if len(which):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.coverage.backends.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
+from ptmtools.coverage.item_buffer import BEFORE, VIEWS, ItemSurfaces
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.errors import MissingComponentError
 
@@ -83,7 +83,7 @@ def cost(triangles: float, pixels: int, gpu: int | None) -> float:
 class OpenGLRenderer:
     """Draws with OpenGL; to be used and closed by the thread that made it."""
 
-    def __init__(self, surfaces: Surfaces, face: int, gpu: int | None = None) -> None:
+    def __init__(self, surfaces: ItemSurfaces, face: int, gpu: int | None = None) -> None:
         """Uploads ``surfaces`` to a graphics device, for views of ``face`` pixels a side; raises as
         `create_context`."""
         self._context = context = create_context(gpu)
@@ -96,8 +96,8 @@ class OpenGLRenderer:
         self._low, self._high = corners.min(axis=1), corners.max(axis=1)
         ends = surfaces.vertex if len(surfaces.vertex) else np.zeros((1, 3))
         self._box = np.stack([ends.min(axis=0), ends.max(axis=0)])
-        most = int(context.info["GL_MAX_TEXTURE_SIZE"])
-        widest = max(min(WIDEST[is_software(self.name)], most), 3 * face)
+        largest = int(context.info["GL_MAX_TEXTURE_SIZE"])
+        widest = max(min(WIDEST[is_software(self.name)], largest), 3 * face)
         self._tiles = widest // face  # along a side of the target
         self.most = self._tiles**2 // len(VIEWS)
         self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
@@ -153,17 +153,17 @@ class OpenGLRenderer:
             drawn[cell[np.unique(met[met >= 0])]] = True
             drawn[-1] = False  # the other side of most walls
             kept = np.flatnonzero(drawn[cell].any(axis=1) | (cell < 0).all(axis=1))
-        position = self._surfaces.normalised(points.position)
+        position = self._surfaces.normalise(points.position)
         # Extent of the triangles, seen from the points.
         low = self._low[kept] - position.max(axis=0)
         high = self._high[kept] - position.min(axis=0)
         lists = []
         for right, up, forward in VIEWS:
-            _, deepest = _along(forward, low, high)
+            _, deepest = _box_range(forward, low, high)
             ahead = deepest > 0
             for axis in (right, up):
-                least, most = _along(axis, low, high)
-                sideways = np.maximum(np.maximum(least, -most), 0.0)
+                nearest, farthest = _box_range(axis, low, high)
+                sideways = np.maximum(np.maximum(nearest, -farthest), 0.0)
                 ahead &= sideways <= (1 + 1 / self._face) * deepest
             shown = kept[ahead]
             opaque = self._surfaces.opaque[shown]
@@ -195,24 +195,24 @@ class OpenGLRenderer:
         target.viewport = (0, 0, *size)
         pixels = np.frombuffer(target.read(size, components=1, dtype="u4"), dtype=np.uint32)
         split = pixels.reshape(rows, face, tiles, face)
-        each = split.transpose(0, 2, 1, 3).reshape(rows * tiles, face**2)
-        return np.asarray(each[: len(VIEWS) * len(points)], dtype=np.int64)
+        images = split.transpose(0, 2, 1, 3).reshape(rows * tiles, face**2)
+        return np.asarray(images[: len(VIEWS) * len(points)], dtype=np.int64)
 
     def _uniforms(self, points: SamplePoints, layer: int) -> Iterator[dict[str, Any]]:
         """The shaders' variables for each sample point."""
-        position = self._surfaces.normalised(points.position)
+        position = self._surfaces.normalise(points.position)
         high, low = _two_floats(position)
         # A surface at distance r from the point has a depth of at least r / √3 wherever it is seen.
         near = points.near * self._surfaces.scale / 2
         # Twice the farthest depth: what is farthest still passes the test against 1.
-        far = 2 * np.abs(self._box[:, None] - position).max(axis=(0, 2))
+        depth = 2 * np.abs(self._box[:, None] - position).max(axis=(0, 2))
         for k in range(len(points)):
             yield {
                 "point_high": tuple(high[k].tolist()),
                 "point_low": tuple(low[k].tolist()),
                 "shift": tuple((points.shift[k] / self._face).tolist()),
                 "near": float(near[k]),
-                "depth_scale": (1.0 if layer == 0 else BEFORE) / float(far[k]),
+                "depth_scale": (1.0 if layer == 0 else BEFORE) / float(depth[k]),
             }
 
     def close(self) -> None:
@@ -227,7 +227,7 @@ def _two_floats(values: Floats) -> tuple[Singles, Singles]:
     return high, (values - high).astype(np.float32)
 
 
-def _along(axis: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+def _box_range(axis: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Least and greatest coordinates of (n, 3) boxes along an axis of the coordinates."""
     i = int(np.argmax(np.abs(axis)))
     return (low[:, i], high[:, i]) if axis[i] > 0 else (-high[:, i], -low[:, i])

@@ -236,10 +236,10 @@ class _DatabaseCheck:
             return present or chosen_emitters(EmitOptions().format)
 
     def _read_files(self, database: ServedDatabase, progress: Progress, workers: int) -> None:
-        from ptmtools.parallel import ordered
+        from ptmtools.parallel import map_in_order
 
         names = sorted({*self._outputs, *(f"{SERVED}/{path}" for path in self._ours)})
-        for i, reading in enumerate(ordered(self._read, names, workers)):
+        for i, reading in enumerate(map_in_order(self._read, names, workers)):
             progress(i, len(names), "files")
             self.findings.take(reading.findings.issues())
             if reading.size is None:

@@ -133,7 +133,7 @@ def read_records(
     """The textures that a stage has encoded: the `.ptm` of each, and its image, cell or object."""
     from ptmtools.output import TextureRecord
     from ptmtools.output.model import PreviewRecord
-    from ptmtools.parallel import ordered
+    from ptmtools.parallel import map_in_order
 
     db, outputs, options = run.db, run.outputs(stage), run.recorded(TEXTURES)
 
@@ -174,7 +174,7 @@ def read_records(
             **owner,
         )
 
-    return tuple(ordered(one, files, OBJECTS_AHEAD))
+    return tuple(map_in_order(one, files, OBJECTS_AHEAD))
 
 
 def _summary(n: Mapping[str, Any]) -> str:

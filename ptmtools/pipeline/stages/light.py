@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ptmtools.cells.model import Cells
-    from ptmtools.light.cells import Baking, CellLight, Piece
-    from ptmtools.light.looks import Painted
-    from ptmtools.light.model import Light
+    from ptmtools.light.cells import CellLight, LightBaking
+    from ptmtools.light.looks import PaintedLight
+    from ptmtools.light.model import CellSurfaces, Light
     from ptmtools.scene.lights import Lights
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
 _MOST = 1 << 40
-#: The input for the bytes of the images, as `rounded`.
+#: The input for the bytes of the images, as `round_bytes`.
 _IMAGES = "bytes of images"
 #: An input of a run that left out the lightmaps, as long as xatlas is not installed.
 _ABSENT = "xatlas"
@@ -51,11 +51,13 @@ _ABSENT = "xatlas"
 class LitCells:
     """The shared input of all tasks."""
 
-    baking: Baking
+    baking: LightBaking
     options: TextureOptions
 
 
-def lit(shared: LitCells, task: tuple[int, Piece]) -> tuple[CellLight, list[tuple[str, bytes]]]:
+def lit(
+    shared: LitCells, task: tuple[int, CellSurfaces]
+) -> tuple[CellLight, list[tuple[str, bytes]]]:
     """The light of a cell, and the files of its lightmap as `encoded_image` returns them; none
     without one."""
     cell, piece = task
@@ -107,7 +109,7 @@ class LightJob(Job):
             return described(work, _NO_LIGHT, ())
         import numpy as np
 
-        from ptmtools.light.budget import LEAST, affordable, expected_bytes, rounded
+        from ptmtools.light.cells import LEAST, affordable_density, expected_bytes, round_bytes
         from ptmtools.light.model import Light
         from ptmtools.output.geometry import Geometry
         from ptmtools.output.pieces import pieces_of
@@ -118,7 +120,9 @@ class LightJob(Job):
         options, texel = self.options, 1 / self.options.light_density
         pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, scene_origin(run).objects)
         if options.light == "auto" and not own:
-            density = affordable(pieces, options.light_density, rounded(image_bytes(run)))
+            density = affordable_density(
+                pieces, options.light_density, round_bytes(image_bytes(run))
+            )
             if not density:
                 least = round(expected_bytes(pieces, LEAST * options.light_density))
                 return described(work, {**_NO_LIGHT, "too_many_bytes": least}, ())
@@ -149,20 +153,24 @@ class LightJob(Job):
         return described(work, counts, _notes(cell_lights))
 
     def _baking(
-        self, options: LightOptions, own: Lights | None, lights: Lights | None, pieces: list[Piece]
-    ) -> Baking:
+        self,
+        options: LightOptions,
+        own: Lights | None,
+        lights: Lights | None,
+        pieces: list[CellSurfaces],
+    ) -> LightBaking:
         """What the tasks share: the light of the model, or lamps and the sky."""
-        from ptmtools.light.cells import ABOVE, WHITE, Baking
+        from ptmtools.light.cells import ABOVE, WHITE, LightBaking
         from ptmtools.light.lamps import lamps_of
-        from ptmtools.light.mixing import mixed
-        from ptmtools.light.occlusion import Surroundings
+        from ptmtools.light.mixing import light_mix
+        from ptmtools.light.occlusion import Occluders
 
         scene = self.run[SCENE]
-        around = Surroundings.of(scene)
+        around = Occluders.from_scene(scene)
         if own:
-            return Baking(around, options, painted=_painted(self.run, own))
+            return LightBaking(around, options, painted=_painted(self.run, own))
         lamps = lamps_of(scene, lights)
-        return Baking(around, options, mixed(around, pieces, lamps, options, ABOVE, WHITE))
+        return LightBaking(around, options, light_mix(around, pieces, lamps, options, ABOVE, WHITE))
 
 
 def _check_component() -> None:
@@ -183,20 +191,20 @@ def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> ND
     those without a lightmap of the model, or that glow."""
     import numpy as np
 
-    from ptmtools.light.lamps import glowing
+    from ptmtools.light.lamps import lamp_luminance
 
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
     if lights is None:
         return glass
     own = glass | lights.unlit
-    return own | (lights.map < 0 if painted else glowing(scene, lights) > 0)
+    return own | (lights.map < 0 if painted else lamp_luminance(scene, lights) > 0)
 
 
-def _painted(run: Run, lights: Lights) -> Painted:
+def _painted(run: Run, lights: Lights) -> PaintedLight:
     """The lightmaps of the model, for the faces of the scene with replaced objects."""
     import numpy as np
 
-    from ptmtools.light.looks import LightImage, Painted, red_texels
+    from ptmtools.light.looks import LightImage, PaintedLight, red_texels
 
     scene = run.original(SCENE)
     files = {each.data for each in lights.maps}
@@ -204,10 +212,10 @@ def _painted(run: Run, lights: Lights) -> Painted:
     images = tuple(LightImage(decoded[k.data], k.wrap, k.strength) for k in lights.maps)
     image = lights.map[scene.triangle_material]
     uv = lights.uv.astype(np.float64)
-    return Painted(scene.corners, uv, image, images, scene_origin(run).triangle)
+    return PaintedLight(scene.corners, uv, image, images, scene_origin(run).triangle)
 
 
-def _about(baking: Baking) -> Mapping[str, Any]:
+def _about(baking: LightBaking) -> Mapping[str, Any]:
     """What the light consists of."""
     if baking.painted is not None:
         return {"light": "model"}
@@ -247,9 +255,9 @@ def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
         return {}
     lights = {} if digest is None else {name: digest}
     if options.light == "auto":
-        from ptmtools.light.budget import rounded
+        from ptmtools.light.cells import round_bytes
 
-        lights[_IMAGES] = sha256(str(rounded(image_bytes(artifacts))).encode())
+        lights[_IMAGES] = sha256(str(round_bytes(image_bytes(artifacts))).encode())
     before = artifacts.before(LIGHT)
     if before and _ABSENT in before.inputs and options.light == "auto" and not _has_component():
         lights[_ABSENT] = ""

@@ -287,7 +287,7 @@ class ReadingJob(Job):
     ) -> None:
         """Stages the list of images, and a copy of each fresh one, which must be decodable; the
         others are in the list ``before``."""
-        from ptmtools.parallel import ordered
+        from ptmtools.parallel import map_in_order
         from ptmtools.texture.images import check_image
         from ptmtools.texture.model import Limits
 
@@ -301,7 +301,7 @@ class ReadingJob(Job):
             return len(data)
 
         sizes = {row["name"]: row["bytes"] for row in before}
-        lengths = ordered(put, fresh, self.run.workers.here)
+        lengths = map_in_order(put, fresh, self.run.workers.here)
         sizes |= {image.name: length for image, length in zip(fresh, lengths, strict=True)}
         rows = [
             {

@@ -100,9 +100,9 @@ def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
     rows = image_rows(artifacts)
     if not options.trim:
         return [0] * len(rows)
-    from ptmtools.coverage.required_levels import Screen, unresolved_levels
+    from ptmtools.coverage.required_levels import VisitorScreen, unresolved_levels
 
-    screen = Screen(options.trim_height, options.trim_fov, options.trim_distance)
+    screen = VisitorScreen(options.trim_height, options.trim_fov, options.trim_distance)
 
     def levels() -> list[int]:
         stages = artifacts[SCENE], artifacts[CELLS], artifacts[PVS]
@@ -371,7 +371,7 @@ class TexturesJob(Job):
         self, remote: RemoteDatabase, executor: Executor, wanted: Iterable[int], chunk: int
     ) -> Iterator[EncodedAtUrl]:
         """The textures that workers have encoded from and to objects at the URL."""
-        from ptmtools.parallel import ordered
+        from ptmtools.parallel import map_in_order
 
         images, folder = images_of(self.run), self.run.folder_url
 
@@ -384,7 +384,7 @@ class TexturesJob(Job):
             return ImageTask(image.name, image.sha256, unresolved=self._fewer[i], file=file)
 
         place = SharedUrl(self.options, remote.url, folder)
-        tasks = ordered(sent, wanted, OBJECTS_AHEAD)
+        tasks = map_in_order(sent, wanted, OBJECTS_AHEAD)
         return executor.each(encoded_at_url, place, tasks, releases_lock=True, chunk=chunk)
 
     def _task(self, i: int) -> str:
@@ -395,12 +395,12 @@ class TexturesJob(Job):
 
     def _stored(self, transaction: Transaction) -> Iterator[Stored]:
         """All textures, staged or committed."""
-        from ptmtools.parallel import ordered
+        from ptmtools.parallel import map_in_order
 
         def one(name: str) -> Stored:
             return stored_texture(self.run, name, transaction.source, transaction.read)
 
-        return ordered(one, self._names, OBJECTS_AHEAD)
+        return map_in_order(one, self._names, OBJECTS_AHEAD)
 
 
 def stored_texture(

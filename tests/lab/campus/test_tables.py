@@ -16,7 +16,7 @@ from PIL import Image
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.rendering.pyramids import mip_levels
-from ptmtools.rendering.rays import Camera
+from ptmtools.rendering.rays import RayCamera
 from ptmtools.walk import Walk
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.simulation import CampusRun, simulate_campus
@@ -41,7 +41,7 @@ EYES = np.array([[0.0, 4, 20], [-20, 1.6, 5], [0, 12, 15], [15, 1.6, 50]])
 LOOKS = np.array([[0.3, -0.05, -1], [1, 0.05, -0.4], [0.2, -1, -0.6], [0, 0.3, 1]])
 LOOKS /= np.linalg.norm(LOOKS, axis=1, keepdims=True)
 WALK = Walk(np.arange(4.0), EYES, LOOKS, 1.0472, 16 / 9)
-CAMERA = Camera(*PIXELS, WALK.field_of_view, WALK.aspect)
+CAMERA = RayCamera(*PIXELS, WALK.field_of_view, WALK.aspect)
 
 
 class Picture:

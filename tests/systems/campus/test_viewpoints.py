@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.occlusion import Surroundings
+from ptmtools.light.occlusion import Occluders
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools_systems.campus.objects import parts_of
 from ptmtools_systems.campus.viewpoints import EYE, STEP, viewpoint
@@ -57,7 +57,7 @@ def over_ground(corner: Floats, eye: Floats, ground: float) -> tuple[float, bool
 
 
 def check(scene: Scene) -> None:
-    around = Surroundings.of(scene)
+    around = Occluders.from_scene(scene)
     opaque = scene.corners[scene.opaque]
     for part in parts_of(scene, 10.0):
         corner = scene.corners[part.triangles]
