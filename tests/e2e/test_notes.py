@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.scene.test_facing import glb
+from tests.scene.orientation.test_facing import glb
 
 from ptmtools.cells.model import Cells
 from ptmtools.pipeline.build import build_scene

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.errors import DatabaseError
-from ptmtools.output.hints import _rounded_down
+from ptmtools.output.hints import _round_down
 from ptmtools.output.numbers import coordinates, json_text, shares_of, significant
 
 
@@ -58,7 +58,7 @@ def test_boxes_are_rounded_outwards(steps: float, decimals: int) -> None:
     """Within the building, that is within thousands of steps."""
     step = 10.0**-decimals
     value = steps * step
-    low = float(_rounded_down(np.array([value]), decimals)[0])
+    low = float(_round_down(np.array([value]), decimals)[0])
     assert low <= value
     assert value - low <= step * (1 + 1e-9)
     assert len(f"{low:.12g}") <= len(f"{step:.12g}") + 5

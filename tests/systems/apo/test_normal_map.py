@@ -10,13 +10,13 @@ import pytest
 from ptmtools.errors import MissingComponentError
 from ptmtools.executor import Executor
 from ptmtools.light.atlas import unwrap
-from ptmtools.output.object_maps import ObjectMaps
+from ptmtools.output.object_maps import ObjectMaps, frame_axes
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 from ptmtools.texture import EncodeOptions, encode
 from ptmtools_systems.apo.files import streamed
 from ptmtools_systems.apo.making import Simple, octree_around, smooth
 from ptmtools_systems.apo.model import ApoOptions
-from ptmtools_systems.apo.normal_map import NormalMap, axes_of, frames, looked_up, normal_map
+from ptmtools_systems.apo.normal_map import NormalMap, frames, looked_up, normal_map
 from ptmtools_systems.apo.normals import corner_normals
 from ptmtools_systems.apo.reliefs import object_maps
 from ptmtools_systems.apo.sampling import Source, at, nearest, spacing_for, spread
@@ -127,7 +127,7 @@ def test_frames_follow_the_coordinates(mirrored: bool) -> None:
     frame = frames(given, corner)
     sign = -1 if mirrored else 1
     assert frame.tolist() == [[0, 1, 0, sign, 0, 0, sign]] * 2
-    assert axes_of(frame)[0].T.tolist() == [[sign, 0, 0], [0, 0, -1], [0, 1, 0]]
+    assert frame_axes(frame)[0].T.tolist() == [[sign, 0, 0], [0, 0, -1], [0, 1, 0]]
 
 
 def test_without_xatlas(monkeypatch: pytest.MonkeyPatch, mesh: Simple) -> None:
