@@ -52,9 +52,10 @@ from ptmtools_lab.campus.options import CampusWalkOptions  # noqa: E402
 from ptmtools_lab.campus.simulation import simulate_campus  # noqa: E402
 from ptmtools_lab.campus.stock import Stock  # noqa: E402
 from ptmtools_lab.campus.world import prepare_campus  # noqa: E402
-from ptmtools_lab.network import Link  # noqa: E402
+from ptmtools_lab.network import FluidLink  # noqa: E402
 from ptmtools_lab.policies import POLICIES  # noqa: E402
 from ptmtools_lab.simulation import simulate  # noqa: E402
+from ptmtools_lab.tables import Drawing  # noqa: E402
 from ptmtools_lab.world import prepare, read_forms  # noqa: E402
 from ptmtools_systems.apo.files import read_mesh  # noqa: E402
 from ptmtools_systems.campus.model import MASK, PRESETS  # noqa: E402
@@ -170,7 +171,7 @@ def steps(
 ) -> Traffic:
     """A client that requests the files of a step together, and those of the next one when they are
     here and wanted at that time."""
-    line = Link(link)
+    line = FluidLink(link)
     answers = []
     for step, sizes in enumerate(files):
         while not wanted(step, line.now) and line.now < seconds:
@@ -211,7 +212,7 @@ def database(folder: Path, walk: Walk, seconds: float) -> Scene:
     def simulated(visit: Visit, link: Conditions) -> Traffic:
         recording = parse_walk(json.dumps(visit.recording).encode())
         assert recording.browser
-        world = prepare(served, recording, pyramids, forms=shows)
+        world = prepare(served, recording, pyramids, drawing=Drawing(forms=shows))
         run = simulate(world, POLICIES["gpuii"], link, recording.browser.budget)
         moment = run.time - recording.browser.begun + visit.begun
         return traffic(run.requests, moment, run.fetched)

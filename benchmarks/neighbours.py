@@ -45,6 +45,7 @@ from ptmtools_lab.policies import POLICIES, PolicyEntry
 from ptmtools_lab.policies.whole_files import GpuiiClient
 from ptmtools_lab.report import link_text
 from ptmtools_lab.simulation import simulate
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare, read_forms
 
 FOLDER = ROOT / "build/bench/neighbours"
@@ -111,7 +112,7 @@ def world_of(scene: Scene, policies: Sequence[PolicyEntry]) -> World:
     served = read_served(database)
     pyramids = read_pyramids(served)
     forms = read_forms(served, pyramids, (policy.form for policy in policies))
-    return prepare(served, read_walk(walk), pyramids, forms=forms)
+    return prepare(served, read_walk(walk), pyramids, drawing=Drawing(forms=forms))
 
 
 def made(maker: tuple[str, ...], model: Path) -> None:
@@ -153,7 +154,7 @@ def complete(world: World) -> float:
     of = np.repeat(np.arange(views.frames), np.diff(views.start))
     left = np.where(views.texture >= 0, rows, 0.0)
     frames: Floats = np.bincount(of, left, views.frames)
-    return float(frames[world.view].mean())
+    return float(frames[world.track.view].mean())
 
 
 def runs_table(block: list[RunResult]) -> Iterator[str]:
@@ -188,7 +189,7 @@ def bytes_table(world: World, policies: Sequence[PolicyEntry]) -> Iterator[str]:
 
 def standing_places(world: World) -> list[int]:
     """Frames in which the walker has just come to stand, spread over the walk."""
-    begins = np.flatnonzero(world.still[1:] & ~world.still[:-1]) + 1
+    begins = np.flatnonzero(world.track.still[1:] & ~world.track.still[:-1]) + 1
     chosen = begins[np.linspace(0, len(begins) - 1, min(PLACES, len(begins))).astype(int)]
     actual: list[int] = chosen.tolist()
     return actual
@@ -198,10 +199,8 @@ def by_bytes(world: World, policy: PolicyEntry, places: Sequence[int]) -> tuple[
     """e at each of the `MARKS` and at the end, and the bytes by then."""
     own, actual = world.in_form(policy.form), []
     for frame in places:
-        stands = replace(
-            own,
-            **{name: getattr(own, name)[frame:] for name in ("view", "eye", "direction", "cell")},
-        ).standing(STANDS)
+        track = own.track.looking(slice(frame, None))
+        stands = replace(own, track=track).standing(STANDS)
         run = simulate(stands, policy, LINK, own.catalogue.whole)
         at = np.searchsorted(run.fetched, MARKS, "right") - 1
         actual.append([*run.error[np.maximum(at, 0)], run.error[-1], run.fetched[-1]])

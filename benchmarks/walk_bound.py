@@ -83,7 +83,7 @@ def bound(world: World, frames: Ints, link: Conditions, budget: int) -> float:
     """The least mean error over some frames of a walk."""
     stock, views, program, constant = world.catalogue, world.views, Program(), 0.0
     assert link.bandwidth is not None
-    rows = np.concatenate([np.r_[views.rows(int(world.view[f]))] for f in frames.tolist()])
+    rows = np.concatenate([np.r_[views.rows(int(world.track.view[f]))] for f in frames.tolist()])
     cells = np.unique(views.cell[rows]).tolist()
     textures = np.unique(views.texture[rows][views.texture[rows] >= 0]).tolist()
     before: dict[tuple[str, int, int], int] = {}
@@ -104,7 +104,7 @@ def bound(world: World, frames: Ints, link: Conditions, budget: int) -> float:
                 program.below([before[part]], loaded[part])
         before = loaded
         trips = WITH_OPENING if world.opening else ROUND_TRIPS
-        seconds = max(0.0, float(world.time[frame]) - trips * link.latency)
+        seconds = max(0.0, float(world.track.time[frame]) - trips * link.latency)
         arrived = link.bandwidth / 8 * seconds
         program.at_most([(loaded[part], size[part]) for part in size], arrived)
         shown = {t: _states(world, program, t, loaded) for t in textures}
@@ -114,7 +114,7 @@ def bound(world: World, frames: Ints, link: Conditions, budget: int) -> float:
             for column, _, variable in states
         ]
         program.at_most(held, float(budget))
-        for row in range(*_ends(views.rows(int(world.view[frame])))):
+        for row in range(*_ends(views.rows(int(world.track.view[frame])))):
             error = views.error[row].astype(np.float64)
             constant += float(error[0])
             drawn = loaded["cell", int(views.cell[row]), 0]
@@ -153,9 +153,10 @@ def _ends(rows: slice) -> tuple[int, int]:
 
 def begun(world: World, seconds: float) -> World:
     """The first seconds of a walk."""
-    part = slice(0, int(seconds * world.rate) + 1)
-    fields = ("view", "time", "eye", "direction", "cell", "still")
-    return replace(world, **{name: getattr(world, name)[part] for name in fields})
+    part = slice(0, int(seconds * world.track.rate) + 1)
+    track = world.track
+    track = replace(track.looking(part), time=track.time[part], still=track.still[part])
+    return replace(world, track=track)
 
 
 def main() -> None:
@@ -173,7 +174,7 @@ def main() -> None:
         options = PathOptions(duration=given.seconds)
         walk = path_through(Artifacts(open_database(db)), options).walk
         world = begun(prepare(read_served(db), walk), given.seconds)
-        frames = np.arange(0, world.frames, round(world.rate))
+        frames = np.arange(0, world.frames, round(world.track.rate))
         for rate, memory in product(given.bandwidth.split(","), given.memory.split(",")):
             link = Conditions(parse_bandwidth(rate))
             budget = budget_of(world, parse_memory(memory))

@@ -29,7 +29,8 @@ from ptmtools_lab.comparing import budget_of
 from ptmtools_lab.forms import PTM
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.simulation import simulate
-from ptmtools_lab.world import RATE, World, prepare
+from ptmtools_lab.track import RATE
+from ptmtools_lab.world import World, prepare
 
 #: The policies that take `.ptm`s.
 OURS = [name for name, policy in POLICIES.items() if policy.form == PTM]

@@ -52,6 +52,7 @@ from ptmtools_lab.forms import PTM
 from ptmtools_lab.measures import STANDS, measure
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.simulation import simulate
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare
 
 BANDWIDTHS = ("56k", "512k", "4M", "16M")
@@ -236,7 +237,7 @@ def made(cases: list[Case], file: Path, jobs: int) -> list[Row]:
 def prepared(scene: str, walk: Path) -> World:
     """The world of a walk through a scene; textures that are decoded are kept for the next."""
     served, pyramids, lossy = _textures(scene)
-    return prepare(served, read_walk(walk), pyramids, lossy=lossy)
+    return prepare(served, read_walk(walk), pyramids, drawing=Drawing(lossy))
 
 
 def _run_all(cases: list[Case], file: Path) -> None:

@@ -66,17 +66,17 @@ def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints, e
     heapq.heapify(heap)
     while len(heap) > 0:
         _, t, to = heapq.heappop(heap)
-        here = column[t]
-        more = cost[t, to] - cost[t, here]
+        current = column[t]
+        more = cost[t, to] - cost[t, current]
         if used + more <= budget:
             used += more
             column[t] = to
-            here = to
+            current = to
         else:
             limit[t] = to - 1
-        if here < limit[t]:
-            density, to = best_step(worth[t], cost[t], here, cost[t, here], limit[t])
-            if to > here:
+        if current < limit[t]:
+            density, to = best_step(worth[t], cost[t], current, cost[t, current], limit[t])
+            if to > current:
                 heapq.heappush(heap, (-density, t, to))
     return exchange(worth, cost, last, budget, used, column) if exact else used
 
@@ -87,7 +87,7 @@ def exchange(worth: Floats, cost: Ints, last: Ints, budget: int, used: int, colu
     these where steps are large beside the budget. Returns the bytes used afterwards."""
     candidate, better = column.copy(), column.copy()
     for _ in range(_EXCHANGES):
-        most, after = 0.0, used
+        best_gain, after = 0.0, used
         for t in range(len(last)):
             _, to = best_step(worth[t], cost[t], column[t], cost[t, column[t]], last[t])
             if to == column[t] or cost[t, to] > budget:
@@ -96,15 +96,15 @@ def exchange(worth: Floats, cost: Ints, last: Ints, budget: int, used: int, colu
             candidate[:] = column
             candidate[t] = to
             size = used + cost[t, to] - cost[t, column[t]]
-            while size > budget and gain > most:
-                other, down, loss = _least(worth, cost, candidate, t)
+            while size > budget and gain > best_gain:
+                victim, down, loss = _least(worth, cost, candidate, t)
                 gain -= loss
-                size -= cost[other, candidate[other]] - cost[other, down]
-                candidate[other] = down
-            if gain > most:
-                most, after = gain, size
+                size -= cost[victim, candidate[victim]] - cost[victim, down]
+                candidate[victim] = down
+            if gain > best_gain:
+                best_gain, after = gain, size
                 better[:] = candidate
-        if most <= 0.0:
+        if best_gain <= 0.0:
             break
         column[:] = better
         used = after
@@ -148,21 +148,21 @@ def offered(
             if present[p]:
                 last[t] = max(last[t], previews.column[p])
         for k in range(1, last[t] + 1):
-            best, of = -np.inf, t
+            best, chosen = -np.inf, t
             for p in range(begin, end):
                 total[p] += worth[count + p, k]
                 if present[p] and k <= previews.column[p]:
                     if previews.exact[p]:
-                        best, of = np.inf, count + p
+                        best, chosen = np.inf, count + p
                     elif total[p] >= best:
-                        best, of = total[p], count + p
+                        best, chosen = total[p], count + p
             if k <= have[t] or best == np.inf:
                 step[t, k] = worth[t, k]
-                source[t, k] = t if k <= have[t] else of
+                source[t, k] = t if k <= have[t] else chosen
                 value += worth[t, k]
             else:
                 step[t, k] = best - value
-                source[t, k], value = of, best
+                source[t, k], value = chosen, best
 
 
 @plain_kernel
@@ -186,35 +186,35 @@ def next_fetch(
     """
     best, source, column = 0.0, -1, 0
     for t in range(len(requested)):
-        until, exact, most, here = min(last[t], stored[t]), 0.0, 0.0, 0
-        while here < until and ends[t, here + 1] <= requested[t]:
-            here += 1
-            exact += worth[t, here]
-            most = max(most, exact)
-        coarse = most
+        until, exact, value_before, reached = min(last[t], stored[t]), 0.0, 0.0, 0
+        while reached < until and ends[t, reached + 1] <= requested[t]:
+            reached += 1
+            exact += worth[t, reached]
+            value_before = max(value_before, exact)
+        coarse = value_before
         for p in range(previews.first[t], previews.first[t + 1]):
             if pending[p]:
                 row, finest = len(requested) + p, previews.column[p]
-                most = max(most, greatest(worth[row], min(finest, last[t]))[0])
+                value_before = max(value_before, greatest(worth[row], min(finest, last[t]))[0])
                 coarse = max(coarse, greatest(worth[row], min(finest, until))[0])
-        own, of, to = 0.0, -1, 0
+        best_density, row_of_best, to = 0.0, -1, 0
         if not busy[t]:
             total = exact - coarse
-            for k in range(here + 1, until + 1):
+            for k in range(reached + 1, until + 1):
                 total += worth[t, k]
                 density = total / max(ends[t, k] - requested[t] + overhead, 1)
-                if total > 0.0 and density >= own:
-                    own, of, to = density, t, k
+                if total > 0.0 and density >= best_density:
+                    best_density, row_of_best, to = density, t, k
         for p in range(previews.first[t], previews.first[t + 1]):
             if pending[p]:
                 continue
             row = len(requested) + p
             value, k = greatest(worth[row], min(previews.column[p], last[t]))
-            density = (value - most) / max(previews.bytes[p] + overhead, 1)
-            if value > most and density >= own:
-                own, of, to = density, row, k
-        if own > best:
-            best, source, column = own, of, to
+            density = (value - value_before) / max(previews.bytes[p] + overhead, 1)
+            if value > value_before and density >= best_density:
+                best_density, row_of_best, to = density, row, k
+        if best_density > best:
+            best, source, column = best_density, row_of_best, to
     return best, source, column
 
 
@@ -255,7 +255,7 @@ def holes(
 
     Parameters
     ----------
-    ray, owner, depth: (n, 3), (n,), (n,) of the pixels, as in `Views`. eye: (3,).
+    ray, owner, depth: (n, 3), (n,), (n,) of the pixels, as in `WalkViews`. eye: (3,).
     low, high: (C, 3) boxes of the cells. loaded: (C,) whether the geometry is loaded.
     missing: cells whose placeholders are drawn.
     """
@@ -291,8 +291,8 @@ def picture(
 
     Parameters
     ----------
-    cell, texture, error, square, need: see `Views`. loaded: (C,) whether the geometry is loaded.
-        column, source, state: (T,) resident column, its source, and its state (`Lossy`).
+    cell, texture, error, square, need: see `WalkViews`. loaded: (C,) whether the geometry is
+        loaded. column, source, state: (T,) resident column, its source, and its state (`Lossy`).
     colored: whether mean colours are known.
     shown: (R, K) becomes true for columns that were wanted and resident. drawn: (C,) the same for
         geometry.
@@ -311,13 +311,13 @@ def picture(
         drawn[cell[r]] = True
         if t < 0:
             continue
-        held = column[t]
-        at = state[t] + 1 if held > 0 else (1 if colored else 0)
+        resident = column[t]
+        at = state[t] + 1 if resident > 0 else (1 if colored else 0)
         mean += error[r, at]
         squared += square[r, at]
         for k in range(need.shape[1]):
             wanted += need[r, k]
-            if k >= held:
+            if k >= resident:
                 missing += need[r, k]
             elif need[r, k] > 0.0:
                 shown[source[t], k + 1] = True

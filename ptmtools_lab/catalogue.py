@@ -8,11 +8,14 @@ of three bytes, so RGB counts four; the paper counts three.
 
 A column has several *sources*: the `.ptm`, and previews (`ptmtools_lab.previews`). Tables by source
 have a row for each texture, which stands for its exact levels, and then one for each preview.
+
+The pictures of the simulator have all objects as modelled: a coarser mesh (`Meshes`) costs a client
+bytes here, and no error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -23,12 +26,69 @@ from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Document, Served
 from ptmtools.output.surfaces import Surfaces
+from ptmtools.rendering.rays import Frustum
 from ptmtools.scene.colors import gradients
-from ptmtools.site.client import LEAST_DIFFERENCE, NORMALS
+from ptmtools.site.client import GROSS, LEAST_DIFFERENCE, NORMALS, SEEN
 from ptmtools.texture.model import gpu_texel_bytes
 from ptmtools.walk import Browser
-from ptmtools_lab.meshes import Meshes, meshes_of
 from ptmtools_lab.previews import Previews, no_previews, previews_of
+
+
+@dataclass(frozen=True)
+class Meshes:
+    """The files of finer meshes, in the order of the index.
+
+    Attributes
+    ----------
+    mesh, cell: (M,) the object's row in the index, ascending, and its cell.
+    bytes: (M,) on the link.
+    low, high: (M, 3) corners of the object's box, metres.
+    error, coarsest: (M,) metres, of the mesh, and of that in the GLB of the cell.
+    """
+
+    mesh: Ints
+    cell: Ints
+    bytes: Ints
+    low: Floats
+    high: Floats
+    error: Floats
+    coarsest: Floats
+
+    @property
+    def finest(self) -> Bools:
+        """(M,) which files have the object as modelled."""
+        last: Bools = np.append(self.mesh[1:] != self.mesh[:-1], len(self.mesh) > 0)
+        return last[: len(self.mesh)]
+
+    def gains(self, there: Bools, frustum: Frustum, nearest: float, behind: float) -> Floats:
+        """(M,) the share of the view, with the severity of its error, that each file improves
+        beside those that are ``there`` (docs/formats/client.md); ``nearest``: the least distance,
+        metres; ``behind``: weight of an object out of sight."""
+        if not len(self.mesh):
+            return np.zeros(0)
+        present = np.full(int(self.mesh[-1]) + 1, np.inf)
+        present[self.mesh] = self.coarsest
+        np.minimum.at(present, self.mesh[there], self.error[there])
+        distance = np.maximum(frustum.distance(self.low, self.high), nearest)
+        size = np.linalg.norm(self.high - self.low, axis=1) / 2
+        ahead = frustum.meets_boxes(self.low, self.high)
+        share = np.minimum(1.0, (size / distance) ** 2) * np.where(ahead, 1.0, behind)
+        now, then = present[self.mesh] / distance, self.error / distance
+        gain = now / (now + GROSS) - then / (then + GROSS)
+        gains: Floats = np.where(now > SEEN, share * np.maximum(gain, 0.0), 0.0)
+        return gains
+
+
+def meshes_of(rows: Sequence[Mapping[str, Any]], sizes: Sequence[Sequence[int]]) -> Meshes:
+    """The files of an index; ``sizes``: bytes of each on the link."""
+    files = [
+        (mesh, row["cell"], size, *row["box"], error, row["errors"][0])
+        for mesh, (row, file_sizes) in enumerate(zip(rows, sizes, strict=True))
+        for size, error in zip(file_sizes, row["errors"][1:], strict=True)
+    ]
+    table = np.array(files, dtype=np.float64).reshape(-1, 11)
+    mesh, cell, size = table[:, :3].astype(np.int64).T
+    return Meshes(mesh, cell, size, table[:, 3:6], table[:, 6:9], table[:, 9], table[:, 10])
 
 
 class Columns(NamedTuple):
@@ -64,8 +124,8 @@ def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
     rows = []
     for texture in textures:
         size, ends = np.array(sizes_of(texture)), texture["ends"]
-        each = np.cumsum(size.prod(axis=1)) * texel_bytes(texture, paper=paper)
-        rows.append(([*ends, *ends[-1:] * (len(size) - len(ends))], each, size))
+        level_memory = np.cumsum(size.prod(axis=1)) * texel_bytes(texture, paper=paper)
+        rows.append(([*ends, *ends[-1:] * (len(size) - len(ends))], level_memory, size))
     stored = np.array([len(texture["ends"]) for texture in textures], dtype=np.int64)
     return aligned(rows)._replace(stored=stored)
 
@@ -74,9 +134,9 @@ def joined(first: Columns, second: Columns) -> Columns:
     """The columns of two lists of textures, one after the other."""
     wide = max(first.ends.shape[1], second.ends.shape[1])
 
-    def both(one: Ints, other: Ints) -> Ints:
-        rest = [(0, 0)] * (one.ndim - 2)
-        parts = (np.pad(a, [(0, 0), (0, wide - a.shape[1]), *rest], "edge") for a in (one, other))
+    def both(head: Ints, tail: Ints) -> Ints:
+        rest = [(0, 0)] * (head.ndim - 2)
+        parts = (np.pad(a, [(0, 0), (0, wide - a.shape[1]), *rest], "edge") for a in (head, tail))
         return np.concatenate(list(parts))
 
     tables = zip(first[2:], second[2:], strict=True)
@@ -120,7 +180,8 @@ class Shapes:
         """These shapes and others, by cell."""
         order = np.argsort(np.concatenate([self.cell, more.cell]), kind="stable")
         both: dict[str, Any] = {
-            name: np.concatenate([own, vars(more)[name]])[order] for name, own in vars(self).items()
+            name: np.concatenate([values, vars(more)[name]])[order]
+            for name, values in vars(self).items()
         }
         return Shapes(**both)
 
@@ -189,9 +250,10 @@ class Catalogue:
         """(R, K) mean difference that each column of each source removes on pixels that want it, 0
         to 255, less than 0 if its texels are worse than the column before; of normal maps
         `NORMALS` of it."""
-        own = self.differences[self.previews.texture] - self.previews.losses(self.ends.shape[1])
-        own[np.arange(own.shape[1]) > self.previews.column[:, None]] = 0.0
-        gains = np.concatenate([self.differences, own])
+        losses = self.previews.losses(self.ends.shape[1])
+        preview_gains = self.differences[self.previews.texture] - losses
+        preview_gains[np.arange(preview_gains.shape[1]) > self.previews.column[:, None]] = 0.0
+        gains = np.concatenate([self.differences, preview_gains])
         textures = np.concatenate([np.arange(self.texture_count), self.previews.texture])
         gains[np.isin(textures, self.normals)] *= NORMALS
         return gains
@@ -206,8 +268,8 @@ class Catalogue:
         if not len(self.previews.texture):
             return self
         column, last = np.arange(self.ends.shape[1]), self.stored[:, None]
-        exists, each = column <= last, np.arange(self.texture_count)[:, None]
-        kept = each, np.minimum(column, last)
+        exists, texture = column <= last, np.arange(self.texture_count)[:, None]
+        kept = texture, np.minimum(column, last)
         return replace(
             self,
             levels=self.stored,
@@ -273,17 +335,17 @@ class Catalogue:
     ) -> Catalogue:
         """The same catalogue with further textures and shapes after its own; ``differences`` (T',
         K')."""
-        each = (getattr(self, name) for name in Columns._fields)
-        own = joined(Columns(*each), more)
-        wide = own.ends.shape[1]
+        tables = (getattr(self, name) for name in Columns._fields)
+        columns = joined(Columns(*tables), more)
+        wide = columns.ends.shape[1]
         wider = [
             np.pad(d, ((0, 0), (0, wide - d.shape[1]))) for d in (self.differences, differences)
         ]
         return replace(
             self,
-            **own._asdict(),
+            **columns._asdict(),
             differences=np.concatenate(wider),
-            previews=self.previews.among(len(own.levels)),
+            previews=self.previews.among(len(columns.levels)),
             colors=np.concatenate([self.colors, np.zeros((len(more.levels), 3))]),
             shapes=self.shapes if shapes is None else self.shapes.joined_with(shapes),
         )

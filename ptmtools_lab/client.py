@@ -33,7 +33,7 @@ from ptmtools.site.client import (
     PRIOR_BANDWIDTH,
     PRIOR_LATENCY,
 )
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.world import World
 
 
@@ -46,7 +46,7 @@ class Estimate:
     bandwidth, latency: the prior, bit/s and s, used until enough has arrived.
     """
 
-    def __init__(self, link: Link, bandwidth: float, latency: float) -> None:
+    def __init__(self, link: FluidLink, bandwidth: float, latency: float) -> None:
         self._link, self._prior = link, bandwidth
         self._seen = (link.carried, link.busy)
         self._bytes = self._seconds = 0.0
@@ -54,7 +54,7 @@ class Estimate:
         self._guessed = True
 
     def observe(self, finished: Request | None = None) -> None:
-        """Updates the estimate; call it after each `Link.advance` with its result."""
+        """Updates the estimate; call it after each `FluidLink.advance` with its result."""
         carried, busy = self._link.carried, self._link.busy
         seconds = busy - self._seen[1]
         age = math.log(2) * seconds / HALF_LIFE
@@ -85,8 +85,8 @@ class Estimate:
         return self.latency + 8 * size / self.bandwidth if self.bandwidth else math.inf
 
 
-class Kind(IntEnum):
-    """Kind of a requested file."""
+class FileKind(IntEnum):
+    """FileKind of a requested file."""
 
     INDEX = 0
     RECORD = 1
@@ -98,14 +98,14 @@ class Kind(IntEnum):
 
 
 #: Kinds that are neither textures nor geometry.
-DOCUMENTS = (Kind.INDEX, Kind.RECORD, Kind.STATISTICS)
+DOCUMENTS = (FileKind.INDEX, FileKind.RECORD, FileKind.STATISTICS)
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
     """Bytes ``begin`` to ``end`` of file ``number`` of a kind."""
 
-    kind: Kind
+    kind: FileKind
     number: int
     begin: int
     end: int
@@ -120,7 +120,7 @@ class Files:
         have arrived without a gap.
     """
 
-    def __init__(self, kind: Kind, size: Ints) -> None:
+    def __init__(self, kind: FileKind, size: Ints) -> None:
         self.kind, self.size = kind, size
         self.asked, self.loaded = np.zeros(len(size), np.int64), np.zeros(len(size), np.int64)
         #: By number, the ends of the ranges that were requested and not yet counted, in order, and
@@ -159,7 +159,7 @@ class Client(ABC):
     world, link, budget: the walk, the link, and the limit of texture memory, bytes.
     frame: current frame.
     index: whether it has the index.
-    records, geometry, textures, previews, meshes: see `Files`.
+    records, geometry, textures, previews, meshes: see `RequestedFiles`.
     column: (T,) resident column of each texture. source: (T,) its source, a row of tables by source
         (`ptmtools_lab.catalogue`).
     estimate: estimate of the link.
@@ -168,22 +168,22 @@ class Client(ABC):
 
     ticks = 1
 
-    def __init__(self, world: World, link: Link, budget: int) -> None:
+    def __init__(self, world: World, link: FluidLink, budget: int) -> None:
         self.world, self.link, self.budget = world, link, budget
         stock = world.catalogue
         self.frame = 0
         self.files = {
-            Kind.INDEX: Files(Kind.INDEX, np.array([stock.index_bytes])),
-            Kind.RECORD: Files(Kind.RECORD, stock.record_bytes.copy()),
-            Kind.GEOMETRY: Files(Kind.GEOMETRY, stock.geometry_bytes.copy()),
-            Kind.TEXTURE: Files(Kind.TEXTURE, stock.ends[:, -1]),
-            Kind.STATISTICS: Files(Kind.STATISTICS, np.array([stock.statistics_bytes])),
-            Kind.PREVIEW: Files(Kind.PREVIEW, stock.previews.bytes.copy()),
-            Kind.MESH: Files(Kind.MESH, stock.meshes.bytes.copy()),
+            FileKind.INDEX: Files(FileKind.INDEX, np.array([stock.index_bytes])),
+            FileKind.RECORD: Files(FileKind.RECORD, stock.record_bytes.copy()),
+            FileKind.GEOMETRY: Files(FileKind.GEOMETRY, stock.geometry_bytes.copy()),
+            FileKind.TEXTURE: Files(FileKind.TEXTURE, stock.ends[:, -1]),
+            FileKind.STATISTICS: Files(FileKind.STATISTICS, np.array([stock.statistics_bytes])),
+            FileKind.PREVIEW: Files(FileKind.PREVIEW, stock.previews.bytes.copy()),
+            FileKind.MESH: Files(FileKind.MESH, stock.meshes.bytes.copy()),
         }
-        self.records, self.geometry = self.files[Kind.RECORD], self.files[Kind.GEOMETRY]
-        self.textures, self.previews = self.files[Kind.TEXTURE], self.files[Kind.PREVIEW]
-        self.meshes = self.files[Kind.MESH]
+        self.records, self.geometry = self.files[FileKind.RECORD], self.files[FileKind.GEOMETRY]
+        self.textures, self.previews = self.files[FileKind.TEXTURE], self.files[FileKind.PREVIEW]
+        self.meshes = self.files[FileKind.MESH]
         self.column = np.zeros(stock.texture_count, np.int64)
         self.source = np.arange(stock.texture_count)
         self.estimate = Estimate(link, PRIOR_BANDWIDTH, PRIOR_LATENCY)
@@ -194,14 +194,14 @@ class Client(ABC):
     @property
     def index(self) -> bool:
         """Whether the index has arrived."""
-        return bool(self.files[Kind.INDEX].whole[0])
+        return bool(self.files[FileKind.INDEX].whole[0])
 
     @property
     def have(self) -> Ints:
         """(T,) columns whose ranges are completely downloaded."""
         stock = self.world.catalogue
-        held = (stock.ends <= self.textures.loaded[:, None]).sum(axis=1) - 1
-        columns: Ints = np.minimum(held, stock.stored)
+        complete = (stock.ends <= self.textures.loaded[:, None]).sum(axis=1) - 1
+        columns: Ints = np.minimum(complete, stock.stored)
         return columns
 
     @property
@@ -215,36 +215,38 @@ class Client(ABC):
     def look(self, frame: int) -> None:
         """Moves the viewpoint to a frame."""
         self.frame = frame
-        here = int(self.world.cell[frame])
-        if self.records.whole[here]:
-            self.cell = here
+        cell = int(self.world.track.cell[frame])
+        if self.records.whole[cell]:
+            self.cell = cell
         self.settle()
 
     def glance(self, frame: int) -> None:  # noqa: B027 - only browsers have item buffers of other frames
         """Passes a frame; with an item buffer the client may get another one."""
 
-    def give(self, kind: Kind, number: int, size: int) -> None:
+    def give(self, kind: FileKind, number: int, size: int) -> None:
         """Starts a transfer that the client did not request; of a preview, if it knows some."""
         if number < len(self.files[kind].size) and not self.files[kind].asked[number]:
             self.files[kind].size[number] = size
             self.ask(kind, number, size, math.inf)
 
-    def ask(self, kind: Kind, number: int, end: int, priority: float) -> None:
+    def ask(self, kind: FileKind, number: int, end: int, priority: float) -> None:
         """Requests a file up to a byte."""
         part, now = self.files[kind].ask(number, end), self.link.now
-        browser = self.world.browser
+        browser = self.world.track.browser
         late = browser.sent.until(now) - now if browser else 0.0
         self.waiting.append(self.link.request(part.end - part.begin, priority, part, late))
 
     def open(self) -> None:
         """Requests the index and the opening, if there is one, at once."""
-        self.whole(Kind.INDEX, 0, math.inf)
-        parts = [self.files[Kind[kind.upper()]].ask(n, end) for kind, n, end in self.world.opening]
+        self.whole(FileKind.INDEX, 0, math.inf)
+        parts = [
+            self.files[FileKind[kind.upper()]].ask(n, end) for kind, n, end in self.world.opening
+        ]
         if parts:
             (size, part), *rest = [(part.end, part) for part in parts]
             self.waiting.append(self.link.request(size, math.inf, part, rest=tuple(rest)))
 
-    def whole(self, kind: Kind, number: int, priority: float) -> bool:
+    def whole(self, kind: FileKind, number: int, priority: float) -> bool:
         """Requests a file as a whole; returns False if it was requested before."""
         files = self.files[kind]
         if files.asked[number]:
@@ -255,8 +257,8 @@ class Client(ABC):
     def modelled(self, cells: Ints) -> list[int]:
         """The files that have objects in some cells as modelled."""
         meshes = self.world.catalogue.meshes
-        own: list[int] = np.flatnonzero(meshes.finest & np.isin(meshes.cell, cells)).tolist()
-        return own
+        files: list[int] = np.flatnonzero(meshes.finest & np.isin(meshes.cell, cells)).tolist()
+        return files
 
     def loaded_shapes(self, first: int = 0) -> Ints:
         """The shapes of cells with loaded geometry whose texture is ``first`` or a later one."""

@@ -19,7 +19,7 @@ from ptmtools_lab.forms import FORMS, PTM
 from ptmtools_lab.measures import STANDS, Flip, Measures, measure
 from ptmtools_lab.policies import POLICIES, PolicyEntry
 from ptmtools_lab.policies.paper import PaperOptions
-from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.simulation import WalkRun, simulate
 from ptmtools_lab.world import World
 
 
@@ -126,7 +126,7 @@ class RunResult:
 
     walk: str
     memory: str
-    run: Run
+    run: WalkRun
     measures: Measures
     flip: float | None = None
 
@@ -191,8 +191,8 @@ def play(
     InputError: PTM-I701 a policy's hints, or the textures in its form, are missing; PTM-I111.
     MissingComponentError: PTM-M100 with ``flip``, without flip-evaluator.
     """
-    own = [policy.configured(paper or PaperOptions()) for policy in options.policies]
-    policies: list[PolicyEntry | CampusPolicy] = [*own, *options.campus_policies]
+    configured = [policy.configured(paper or PaperOptions()) for policy in options.policies]
+    policies: list[PolicyEntry | CampusPolicy] = [*configured, *options.campus_policies]
     cases = [
         (link, memory, policy, name)
         for link in options.links(trace)

@@ -22,13 +22,13 @@ from ptmtools.rendering.light import as_bytes
 from ptmtools_lab.comparing import RunResult
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.paper import PaperOptions
-from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.renderer import FrameRenderer
 from ptmtools_lab.report import link_text
-from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.simulation import WalkRun, simulate
 from ptmtools_lab.world import World
 
 #: Measures of a plot: label of the axis, and the values of a run.
-MEASURES: dict[str, tuple[str, Callable[[Run], Floats]]] = {
+MEASURES: dict[str, tuple[str, Callable[[WalkRun], Floats]]] = {
     "e": ("e, mean error of the pixels (0 to 255)", lambda run: run.error),
     "rmse": ("root mean square error (0 to 255)", lambda run: np.sqrt(run.square)),
     "missing": ("share of the wanted levels that is missing", lambda run: run.missing),
@@ -84,13 +84,13 @@ def _draw(block: list[RunResult], measure: str, axes: Any) -> None:
         run.time, 0, 1, where=run.still, step="mid", color="#f2f2f2", linewidth=0,
         transform=axes.get_xaxis_transform(),
     )  # fmt: skip
-    for k, one in enumerate(block):
-        style = {"color": COLORS[k % len(COLORS)], "label": one.run.policy}
-        axes.plot(one.run.time, values(one.run), linewidth=1, **style)
+    for k, played in enumerate(block):
+        style = {"color": COLORS[k % len(COLORS)], "label": played.run.policy}
+        axes.plot(played.run.time, values(played.run), linewidth=1, **style)
     # Values before the first arrival would dwarf the rest.
-    drawn = [values(one.run) for one in block]
-    most = max((float(np.percentile(v, 98)) for v in drawn if np.isfinite(v).all()), default=0.0)
-    axes.set_ylim(0, 1.1 * most if most > 0 else 1)
+    drawn = [values(played.run) for played in block]
+    highest = max((float(np.percentile(v, 98)) for v in drawn if np.isfinite(v).all()), default=0.0)
+    axes.set_ylim(0, 1.1 * highest if highest > 0 else 1)
     axes.set_xlim(0, run.time[-1] or 1)
     title = f"{link_text(run.conditions)}; texture memory {block[0].memory}"
     axes.set(title=title, xlabel="s", ylabel=label)
@@ -106,15 +106,15 @@ INSTANTS, LOCAL = (10.0, 35.0, 80.0), 3.0
 _STRIP_LINES, _LABEL, _GAP = 360, 26, 6
 
 
-def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
+def frames(world: World, run: WalkRun, every: float) -> Iterator[tuple[str, bytes]]:
     """PNGs of the frames of a run, one each ``every`` seconds, named by their time."""
     world = POLICIES[run.policy].in_world(world)
-    renderer = Renderer(world, LINES)
-    step = max(1, round(every * world.rate))
+    renderer = FrameRenderer(world, LINES)
+    step = max(1, round(every * world.track.rate))
     for f in range(0, world.frames, step):
-        sight = renderer.look(world.eye[f], world.direction[f])
+        sight = renderer.look(world.track.eye[f], world.track.direction[f])
         colors = renderer.colors(sight, run.loaded[f], run.state[f])
-        yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
+        yield f"{world.track.time[f]:07.1f}.png", png(as_bytes(colors))
 
 
 def strip(world: World, played: RunResult, paper: PaperOptions | None = None) -> bytes:
@@ -124,8 +124,8 @@ def strip(world: World, played: RunResult, paper: PaperOptions | None = None) ->
     finished = played.run
     policy = POLICIES[finished.policy].configured(paper or PaperOptions())
     world = policy.in_world(world)
-    renderer = Renderer(world, _STRIP_LINES, samples=3)
-    sight = renderer.look(world.eye[0], world.direction[0])
+    renderer = FrameRenderer(world, _STRIP_LINES, samples=3)
+    sight = renderer.look(world.track.eye[0], world.track.direction[0])
     link = finished.conditions
     local = replace(link, bandwidth=None, latency=0.0, trace=None)
     frames = []
@@ -133,7 +133,7 @@ def strip(world: World, played: RunResult, paper: PaperOptions | None = None) ->
         standing = world.standing(instants[-1])
         run = simulate(standing, policy, conditions, finished.budget)
         for instant in instants:
-            f = int(np.searchsorted(standing.time, instant - 0.5 / standing.rate))
+            f = int(np.searchsorted(standing.track.time, instant - 0.5 / standing.track.rate))
             colors = renderer.colors(sight, run.loaded[f], run.state[f])
             label = f"{instant:g} s{where}, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
             frames.append((label, as_bytes(colors)))
@@ -163,7 +163,7 @@ def _side_by_side(
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(16)
     draw.text((_GAP, 3), title, "black", font)
     for k, (label, picture) in enumerate(pictures):
-        left = _GAP + k * (width + _GAP)
-        draw.text((left, _LABEL + 3), label, "black", font)
-        sheet.paste(Image.fromarray(picture), (left, 2 * _LABEL))
+        offset = _GAP + k * (width + _GAP)
+        draw.text((offset, _LABEL + 3), label, "black", font)
+        sheet.paste(Image.fromarray(picture), (offset, 2 * _LABEL))
     return np.asarray(sheet)

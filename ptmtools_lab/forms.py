@@ -86,14 +86,14 @@ def interlaced_columns(served: Served, paper: bool) -> Columns:
     for t in range(len(served.index["textures"])):
         manifest = _manifest(served, t)[1]
         parts, stored = manifest.parts, manifest.texel_bytes
-        each = stored if paper else gpu_texel_bytes(stored, manifest.components)
-        held = [each * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
+        texel_bytes = stored if paper else gpu_texel_bytes(stored, manifest.components)
+        memory = [texel_bytes * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
         ends = [*accumulate(part.bytes for part in parts)]
-        rows.append((ends, held, [part.joined for part in parts]))
+        rows.append((ends, memory, [part.joined for part in parts]))
     return aligned(rows)
 
 
-def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
+def shows(served: Served, levels: Pyramids, progress: Progress) -> Shows:
     """See `Form.shows`: the image of the files of each column, with its mip levels.
 
     Raises DatabaseError: as `columns`, and of the files. LimitError: PTM-L104, L204.
@@ -107,12 +107,12 @@ def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
         chains += joined
         steps.append(len(joined))
     first = np.cumsum([0, *steps[:-1]]) if steps else np.zeros(0, np.int64)
-    each = np.array(steps, dtype=np.int64)
+    counts = np.array(steps, dtype=np.int64)
     pyramids = pack_pyramids(chains)
-    wide = int(each.max(initial=0)) + 1
-    row = first[:, None] + np.clip(np.arange(wide) - 1, 0, each[:, None] - 1)
-    held = np.where(np.arange(wide) > 0, pyramids.levels[row], 0)
-    return Shows(pyramids, row, held, each, own.mean)
+    wide = int(counts.max(initial=0)) + 1
+    row = first[:, None] + np.clip(np.arange(wide) - 1, 0, counts[:, None] - 1)
+    resident = np.where(np.arange(wide) > 0, pyramids.levels[row], 0)
+    return Shows(pyramids, row, resident, counts, levels.mean)
 
 
 def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:

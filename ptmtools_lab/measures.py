@@ -15,8 +15,8 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lazy import component
 from ptmtools.rendering.records import Sight
-from ptmtools_lab.renderer import Renderer
-from ptmtools_lab.simulation import Run
+from ptmtools_lab.renderer import FrameRenderer
+from ptmtools_lab.simulation import WalkRun
 from ptmtools_lab.world import World
 
 #: Shares of the error removed, between no data and the full picture.
@@ -41,8 +41,8 @@ class Measures:
     """
     Attributes
     ----------
-    e: see `Run.error`. rmse: root of the mean squared error. missing, quality: see `Run`; the
-        ``p95`` of the quality is what 95 % of the frames reach.
+    e: see `WalkRun.error`. rmse: root of the mean squared error. missing, quality: see `WalkRun`;
+        the ``p95`` of the quality is what 95 % of the frames reach.
     bytes, overhead: received of bodies and of headers.
     waste: the share of received textures and geometry that was never displayed; 0 if nothing was
         received.
@@ -68,7 +68,7 @@ class Measures:
     final: tuple[float | None, ...]
 
 
-def measure(run: Run, world: World, standing: Run) -> Measures:
+def measure(run: WalkRun, world: World, standing: WalkRun) -> Measures:
     """The measures of a run through a world; ``standing`` is the same client in
     `World.standing` for `STANDS`."""
     received = run.body - run.documents
@@ -81,9 +81,9 @@ def measure(run: Run, world: World, standing: Run) -> Measures:
         overhead=round(run.overhead),
         waste=max(0.0, 1 - run.useful / received) if received else 0.0,
         requests=run.requests,
-        stalls=run.stalls / world.rate,
+        stalls=run.stalls / world.track.rate,
         uploads=run.uploads,
-        switches=run.switches * 60 * world.rate / world.frames,
+        switches=run.switches * 60 * world.track.rate / world.frames,
         overruns=run.overruns,
         final=seconds_to(standing, empty_error(world, 0)),
     )
@@ -91,12 +91,12 @@ def measure(run: Run, world: World, standing: Run) -> Measures:
 
 def empty_error(world: World, frame: int) -> float:
     """The e of a frame before any arrival."""
-    rows = world.views.rows(int(world.view[frame]))
+    rows = world.views.rows(int(world.track.view[frame]))
     return float(world.views.error[rows, 0].sum())
 
 
 def _summary(
-    run: Run,
+    run: WalkRun,
     values: Floats,
     after: Callable[[float], float] = float,
     *,
@@ -115,7 +115,7 @@ def _summary(
     )
 
 
-def seconds_to(standing: Run, nothing: float) -> tuple[float | None, ...]:
+def seconds_to(standing: WalkRun, nothing: float) -> tuple[float | None, ...]:
     """`Measures.final` of a standing run, with the e before any arrival."""
     # A table of float32 may leave a rounding error.
     rounding = nothing * float(np.finfo(np.float32).eps)
@@ -150,16 +150,16 @@ class Flip:
         self.frame: Ints = np.sort(
             random.choice(world.frames, min(count, world.frames), replace=False)
         )
-        self._renderer = Renderer(
+        self._renderer = FrameRenderer(
             world, max(1, round(math.sqrt(PIXELS / world.camera.aspect))), _SAMPLES
         )
         self.height, self.width = self._renderer.height, self._renderer.width
         self._sights: list[Sight] = [
-            self._renderer.look(world.eye[f], world.direction[f]) for f in self.frame
+            self._renderer.look(world.track.eye[f], world.track.direction[f]) for f in self.frame
         ]
         self._full = [self._renderer.full(sight) for sight in self._sights]
 
-    def each(self, run: Run) -> Floats:
+    def each(self, run: WalkRun) -> Floats:
         """(n,) the mean FLIP of each of the frames."""
         return np.array(
             [

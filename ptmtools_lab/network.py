@@ -91,10 +91,10 @@ class Request:
         return -self.priority, self.number
 
 
-_left, _rank, _starts = attrgetter("left"), attrgetter("rank"), attrgetter("starts")
+_bytes_left, _rank, _starts = attrgetter("left"), attrgetter("rank"), attrgetter("starts")
 
 
-class Link:
+class FluidLink:
     """A link with its requests.
 
     Bytes are booked twice: ``carried`` is the integral of the rate over time, and equals
@@ -198,7 +198,7 @@ class Link:
         """Moves bytes up to ``until``, at most until a request is complete, which is then
         returned."""
         receivers = self._arriving if self._shared else self._arriving[:1]
-        nearest = min(receivers, key=_left)
+        nearest = min(receivers, key=_bytes_left)
         rate = self._rate / len(receivers)
         amount = nearest.left
         seconds = amount / rate if rate else math.inf if amount else 0.0

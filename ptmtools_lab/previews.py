@@ -64,9 +64,9 @@ def no_previews(textures: int) -> Previews:
 
 def previews_of(textures: Sequence[Mapping[str, Any]]) -> Previews:
     """The previews of rows of the index."""
-    each = [row.get("previews", ()) for row in textures]
-    rows = [preview for of_texture in each for preview in of_texture]
-    count = np.array([len(of_texture) for of_texture in each], dtype=np.int64)
+    by_texture = [row.get("previews", ()) for row in textures]
+    rows = [preview for of_texture in by_texture for preview in of_texture]
+    count = np.array([len(of_texture) for of_texture in by_texture], dtype=np.int64)
     exact = np.array([row.get("exact", False) for row in rows], dtype=np.bool_)
     error = np.array([row["difference"] for row in rows], dtype=np.float64)
     return Previews(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ptmtools_lab.world import World
 
 
-class Renderer:
+class FrameRenderer:
     """Renders pictures of ``height`` lines with the aspect of the walk, with ``samples`` each way
     of every pixel."""
 
@@ -73,14 +73,14 @@ class Renderer:
             from ptmtools_systems.apo.lighting import relieve
 
             octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
-            held = column[first : first + octrees.number]
-            relieve(sight, self._triangles, self._lamps, octrees, loaded, held, shown)
+            resident = column[first : first + octrees.number]
+            relieve(sight, self._triangles, self._lamps, octrees, loaded, resident, shown)
             show_relief(sight, surfaces, shows, loaded, column, self._lamps, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)
         return self._picture(shown)
 
     def _picture(self, shown: Floats) -> Floats:
         """(height, width, 3) picture of (n, 3) samples."""
-        each = (self.height, self.samples, self.width, self.samples, 3)
-        result: Floats = shown.reshape(each).mean(axis=(1, 3))
+        shape = (self.height, self.samples, self.width, self.samples, 3)
+        result: Floats = shown.reshape(shape).mean(axis=(1, 3))
         return result

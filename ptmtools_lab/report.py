@@ -65,8 +65,8 @@ def table(
         )
     lines.append("")
     lines += [
-        f"{name}: {world.time[-1]:.0f} s, {world.frames:,} frames, the viewpoint at rest in "
-        f"{world.still.mean():.0%} of them"
+        f"{name}: {world.track.time[-1]:.0f} s, {world.frames:,} frames, the viewpoint at rest in "
+        f"{world.track.still.mean():.0%} of them"
         for name, world in worlds.items()
     ]
     wide = max(len(p.run.policy) for p in played)
@@ -155,14 +155,14 @@ def document(
         "lit": lit,
         "against": against,
         "textureMemory": some.catalogue.whole,
-        "framesPerSecond": some.rate,
+        "framesPerSecond": some.track.rate,
         "pixels": [some.camera.width, some.camera.height],
         "walks": [
             {
                 "name": name,
-                "seconds": round(float(world.time[-1]), _DIGITS),
+                "seconds": round(float(world.track.time[-1]), _DIGITS),
                 "frames": world.frames,
-                "still": round(float(world.still.mean()), _DIGITS),
+                "still": round(float(world.track.still.mean()), _DIGITS),
             }
             for name, world in worlds.items()
         ],
@@ -224,16 +224,16 @@ def as_csv(played: Sequence[RunResult]) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
-    for one in played:
-        run = one.run
+    for result in played:
+        run = result.run
         link = run.conditions
         rate = "" if link.bandwidth is None else f"{link.bandwidth:g}"
-        head = [run.policy, rate, f"{link.latency:g}", link.protocol, run.budget, one.walk]
+        head = [run.policy, rate, f"{link.latency:g}", link.protocol, run.budget, result.walk]
         numbers = np.stack([run.error, np.sqrt(run.square), run.missing, run.quality], axis=1)
         whole = np.stack([run.still, run.memory, np.rint(run.fetched)], axis=1).astype(np.int64)
-        for time, (still, held, received), row in zip(
+        for time, (still, memory, received), row in zip(
             run.time.tolist(), whole.tolist(), numbers.tolist(), strict=True
         ):
             known = ["" if math.isnan(v) else f"{v:.6g}" for v in row]
-            rows.writerow([*head, f"{time:g}", still, *known, held, received])
+            rows.writerow([*head, f"{time:g}", still, *known, memory, received])
     return text.getvalue()

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Ints, Singles
 
 
-class Rows(NamedTuple):
-    """Rows of `ptmtools_lab.tables.Views`, and (R,) the frame of each, ascending."""
+class ViewRows(NamedTuple):
+    """ViewRows of `ptmtools_lab.tables.WalkViews`, and (R,) the frame of each, ascending."""
 
     frame: Ints
     cell: NDArray[np.int32]
@@ -60,9 +60,9 @@ class RowSums:
             rows.append((table[pairs] / pixels).astype(np.float32))
             table[pairs] = 0.0
 
-    def rows(self) -> Rows:
+    def rows(self) -> ViewRows:
         """The rows of all frames."""
         count = [len(pairs) for pairs in self._shown[1:]]
         cell, texture = self._pairs[np.concatenate(self._shown)].astype(np.int32).T
         tables = map(np.concatenate, self._rows)
-        return Rows(np.repeat(np.arange(len(count)), count), cell, texture, *tables)
+        return ViewRows(np.repeat(np.arange(len(count)), count), cell, texture, *tables)

@@ -15,8 +15,8 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.link import Conditions
 from ptmtools_lab.allocation import picture
-from ptmtools_lab.client import DOCUMENTS, Client, Kind
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.client import DOCUMENTS, Client, FileKind
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import PolicyEntry
 from ptmtools_lab.world import World
 
@@ -25,7 +25,7 @@ LOOK_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
-class Run:
+class WalkRun:
     """Result of a run; F frames.
 
     Attributes
@@ -73,14 +73,18 @@ class Run:
     overruns: int
 
 
-def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: int) -> Run:
+#: The former name.
+Run = WalkRun
+
+
+def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: int) -> WalkRun:
     """Simulates a walk, with textures in the policy's form. The same arguments give the same run,
     bit for bit.
 
     Raises InputError PTM-I701 if the world was not prepared for that form.
     """
     world = policy.in_world(world)
-    link = Link(conditions)
+    link = FluidLink(conditions)
     client = policy.client(world, link, budget)
     frames, stock, views = world.frames, world.catalogue, world.views
     error, square, missing, quality, fetched = (np.zeros(frames) for _ in range(5))
@@ -90,18 +94,18 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
     shown = np.zeros(stock.gains.shape, dtype=bool)
     before_first = np.concatenate([np.zeros(stock.texture_count, np.int64), stock.previews.state])
     drawn = np.zeros(stock.cell_count, dtype=bool)
-    each = np.arange(stock.texture_count)
+    texture = np.arange(stock.texture_count)
     clock = _Clock(client, link)
     for f in range(frames):
         for tick in range(1, client.ticks if f else 0):
             part = tick / client.ticks
-            clock.until(float((1 - part) * world.time[f - 1] + part * world.time[f]))
+            clock.until(float((1 - part) * world.track.time[f - 1] + part * world.track.time[f]))
             client.tick()
         clock.frame(f)
         column[f], loaded[f] = client.column, client.geometry.whole
         state[f] = np.where(client.column > 0, before_first[client.source] + client.column, 0)
-        memory[f] = stock.memory[each, client.column].sum()
-        rows = views.rows(int(world.view[f]))
+        memory[f] = stock.memory[texture, client.column].sum()
+        rows = views.rows(int(world.track.view[f]))
         error[f], square[f], missing[f] = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square, views.need,
             loaded[f], client.column, client.source, state[f], world.colored, shown, drawn,
@@ -110,18 +114,18 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         arriving = sum(request.received for request in client.waiting)
         fetched[f] = link.bytes - clock.page_bytes + arriving
         client.fetch()
-    held, offset = stock.memory[each, column], state - column
-    grown = np.maximum(np.diff(held, axis=0, prepend=0), 0)
+    resident, offset = stock.memory[texture, column], state - column
+    grown = np.maximum(np.diff(resident, axis=0, prepend=0), 0)
     replaced = (np.diff(offset, axis=0, prepend=offset[:1]) != 0) & (column > 0)
     exact, previews = np.split(shown[:, 1:], [stock.texture_count])
     textures = int((np.diff(stock.ends, axis=1) * exact).sum())
     textures += int(stock.previews.bytes[previews.any(axis=1)].sum())
-    return Run(
+    return WalkRun(
         policy=policy.name,
         conditions=conditions,
         budget=budget,
-        time=world.time,
-        still=world.still,
+        time=world.track.time,
+        still=world.track.still,
         error=error,
         square=square,
         missing=missing,
@@ -137,10 +141,10 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         useful=textures
         + float(stock.geometry_bytes[drawn].sum())
         + float(stock.meshes.bytes[client.meshes.whole & drawn[stock.meshes.cell]].sum()),
-        uploads=int(np.where(replaced, held, grown).sum()),
+        uploads=int(np.where(replaced, resident, grown).sum()),
         switches=int(np.count_nonzero(np.diff(state, axis=0, prepend=0))),
         requests=link.requests - clock.page,
-        stalls=int((~loaded[np.arange(frames), world.cell]).sum()),
+        stalls=int((~loaded[np.arange(frames), world.track.cell]).sum()),
         overruns=int((memory > policy.limits(world, budget)).sum()),
     )
 
@@ -155,9 +159,9 @@ class _Clock:
         arrived.
     """
 
-    def __init__(self, client: Client, link: Link) -> None:
+    def __init__(self, client: Client, link: FluidLink) -> None:
         self._client, self._link = client, link
-        self._browser = client.world.browser
+        self._browser = client.world.track.browser
         self._pushed = deque(self._browser.files if self._browser else ())
         self._begun, self._news, self._looked = False, False, -math.inf
         self._late: deque[tuple[float, Request]] = deque()
@@ -184,7 +188,7 @@ class _Clock:
     def frame(self, frame: int) -> None:
         """Advances time to a frame, and updates the client: in a browser several times a second,
         and after arrivals."""
-        now = float(self._client.world.time[frame])
+        now = float(self._client.world.track.time[frame])
         self.until(now)
         self._begun = True
         self._client.glance(frame)
@@ -209,7 +213,7 @@ class _Clock:
                 self.page += 1
                 self._link.request(pushed.size, math.inf)
             else:
-                self._client.give(Kind[pushed.kind.upper()], pushed.number, pushed.size)
+                self._client.give(FileKind[pushed.kind.upper()], pushed.number, pushed.size)
         return self._flow(moment)
 
     def _flow(self, moment: float) -> Request | None:

@@ -17,9 +17,10 @@ coarser buffer samples fewer pixels of the same picture.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +32,12 @@ from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Lossy, Pyramids, Shows, Sight, Triangles, triangles_of
 from ptmtools.site.client import NORMALS
-from ptmtools_lab.relief.tables import Relief, Tally as ReliefTally
-from ptmtools_lab.rows import Rows, RowSums
+from ptmtools_lab.relief import Relief, ReliefTally
+from ptmtools_lab.rows import RowSums, ViewRows
 
 
 @dataclass(frozen=True)
-class Views:
+class WalkViews:
     """Errors and coverage of the screen, frame by frame; the rows of a frame are its pairs.
 
     Attributes
@@ -76,6 +77,38 @@ class Views:
         return slice(int(self.start[frame]), int(self.start[frame + 1]))
 
 
+class Drawing(NamedTuple):
+    """What the pictures of a walk show besides the levels of its textures, and their reference.
+
+    Attributes
+    ----------
+    lossy: previews of the textures.
+    forms: the same textures in other forms, by name.
+    full: the reference: the same textures in other quality; None: that of the relief, or the
+        textures themselves.
+    same_maps: whether ``full`` is also the reference of lightmaps and normal maps: their layouts
+        agree.
+    relief: octrees, and other relief as the reference.
+    """
+
+    lossy: Lossy | None = None
+    forms: Mapping[str, Shows] = MappingProxyType({})
+    full: Pyramids | None = None
+    same_maps: bool = False
+    relief: Relief | None = None
+
+    def reference(self, pyramids: Pyramids) -> Pyramids:
+        """The reference of textures."""
+        if self.full is not None:
+            return self.full
+        relief = self.relief and self.relief.reference
+        return relief.pyramids if relief else pyramids
+
+
+#: Textures alone.
+PLAIN = Drawing()
+
+
 def look(
     surfaces: Surfaces,
     pyramids: Pyramids,
@@ -83,22 +116,15 @@ def look(
     eye: Floats,
     direction: Floats,
     progress: Progress = silent,
-    *,
-    forms: Sequence[Shows] = (),
-    full: Pyramids | None = None,
-    same_maps: bool = False,
-    relief: Relief | None = None,
-    lossy: Lossy | None = None,
-) -> list[Views]:
-    """The tables of (F, 3) eyes and unit directions of view: of ``pyramids`` and their ``lossy``
-    previews, and of the same textures in other ``forms``; with octrees and other relief, if any.
-    The reference is ``full``, which holds the same textures in other quality, or ``pyramids``; of
-    lightmaps and normal maps it is ``full`` only with ``same_maps``: their layouts agree."""
+    drawing: Drawing = PLAIN,
+) -> list[WalkViews]:
+    """The tables of (F, 3) eyes and unit directions of view: of ``pyramids``, then of the forms of
+    the drawing."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
-    full = pyramids if full is None else full
-    lossy = no_previews(len(pyramids.levels)) if lossy is None else lossy
-    shown: list[Pyramids | Shows] = [pyramids, *forms]
-    whole = full if same_maps else pyramids
+    full, relief = drawing.reference(pyramids), drawing.relief
+    lossy = no_previews(len(pyramids.levels)) if drawing.lossy is None else drawing.lossy
+    shown: list[Pyramids | Shows] = [pyramids, *drawing.forms.values()]
+    whole = full if drawing.same_maps else pyramids
     tallies = [_Tally(triangles, textures, lossy, full, seen) for textures in shown]
     others = [
         (
@@ -124,13 +150,13 @@ def look(
     more = [relief_tally.rows()] if relief_tally else []
     parts = [[tally.rows(), *more] for tally in tallies]
     for weight, maps in others:
-        for own, tally in zip(parts, maps, strict=True):
-            own.append(_of_maps(tally.rows(), weight))
-    return [_views(own, owner, depth) for own in parts]
+        for rows, tally in zip(parts, maps, strict=True):
+            rows.append(_of_maps(tally.rows(), weight))
+    return [_views(rows, owner, depth) for rows in parts]
 
 
-def _of_maps(rows: Rows, weight: float) -> Rows:
-    """Rows of surfaces with a lightmap or normal map as their texture, without those of other
+def _of_maps(rows: ViewRows, weight: float) -> ViewRows:
+    """ViewRows of surfaces with a lightmap or normal map as their texture, without those of other
     surfaces; errors times ``weight``. The error of a missing cell is in the rows of its textures.
     """
     lit = rows.texture >= 0
@@ -138,7 +164,7 @@ def _of_maps(rows: Rows, weight: float) -> Rows:
     kept["error"][:, 0] = kept["square"][:, 0] = 0.0
     kept["error"] *= weight
     kept["square"] *= weight**2
-    return Rows(**kept)
+    return ViewRows(**kept)
 
 
 class _Tally:
@@ -177,7 +203,7 @@ class _Tally:
 def _item_buffer(
     sight: Sight, triangles: Triangles, seen: Bools
 ) -> tuple[NDArray[np.int32], Singles]:
-    """(n,) ``owner`` and ``depth`` of `Views`, for the ``seen`` pixels."""
+    """(n,) ``owner`` and ``depth`` of `WalkViews`, for the ``seen`` pixels."""
     shows, rays = sight.triangle[seen], sight.ray[seen]
     owner, depth = np.full(len(shows), -1, np.int32), np.full(len(shows), np.inf, np.float32)
     hit = np.flatnonzero(shows >= 0)
@@ -189,7 +215,7 @@ def _item_buffer(
     return owner, depth
 
 
-def _views(parts: Sequence[Rows], owner: NDArray[np.int32], depth: Singles) -> Views:
+def _views(parts: Sequence[ViewRows], owner: NDArray[np.int32], depth: Singles) -> WalkViews:
     """The views with the rows of all parts, frame by frame, and their item buffers."""
     frame = np.concatenate([rows.frame for rows in parts])
     order = np.argsort(frame, kind="stable")
@@ -202,19 +228,19 @@ def _views(parts: Sequence[Rows], owner: NDArray[np.int32], depth: Singles) -> V
         return np.concatenate(tables)[order]
 
     start = np.searchsorted(frame[order], np.arange(len(owner) + 1))
-    _, cell, texture, *tables = (joined(*each) for each in zip(*parts, strict=True))
+    _, cell, texture, *tables = (joined(*part) for part in zip(*parts, strict=True))
     error, square, need, sight = tables
-    return Views(start, cell, texture, error, square, need, sight, owner, depth)
+    return WalkViews(start, cell, texture, error, square, need, sight, owner, depth)
 
 
-def limited(views: Views, count: Ints) -> Views:
+def limited(views: WalkViews, count: Ints) -> WalkViews:
     """The views with textures that lack their finest levels and have no previews; ``count`` (T,) is
     the number of levels of each. Missing levels stay an error."""
     deepest = int(count.max(initial=1))
     # One more, for surfaces without texture: the last.
     has = np.arange(deepest) < np.append(count, deepest)[views.texture, None]
-    need, sight = (np.where(has, each[:, :deepest], 0) for each in (views.need, views.sight))
+    need, sight = (np.where(has, table[:, :deepest], 0) for table in (views.need, views.sight))
     error, square = (
-        np.ascontiguousarray(each[:, : deepest + 2]) for each in (views.error, views.square)
+        np.ascontiguousarray(table[:, : deepest + 2]) for table in (views.error, views.square)
     )
     return replace(views, error=error, square=square, need=need, sight=sight)

@@ -2,6 +2,10 @@
 cells.
 
 Preparing it takes most of the time; a run then takes a second.
+
+A walk that begins at the first viewpoint gets the opening of the site
+(`ptmtools.site.opening`): its parts arrive one after the other in one response, which is requested
+together with the index.
 """
 
 from __future__ import annotations
@@ -12,36 +16,67 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.errors import InputError, LimitError
+from ptmtools.arrays import Floats
+from ptmtools.errors import InputError
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Frustum, RayCamera
 from ptmtools.rendering.records import Lossy, Pyramids, Shows
+from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps
 from ptmtools.walk import Browser
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
 from ptmtools_lab.forms import FORMS, PTM
-from ptmtools_lab.opening import Parts, opening_of
-from ptmtools_lab.relief.tables import Relief
-from ptmtools_lab.tables import Views, look
+from ptmtools_lab.relief import Relief
+from ptmtools_lab.tables import PLAIN, Drawing, WalkViews, look
+from ptmtools_lab.track import RATE, Track, track_of
 
 if TYPE_CHECKING:
     from ptmtools.walk import Walk
 
-#: Evaluated frames per second.
-RATE = 5.0
+#: Kind, number and end of each part, in order.
+Parts = tuple[tuple[str, int, int], ...]
+#: How far a walk may begin from the viewpoint, metres, and the cosine of the angle between them.
+NEAR, ALIKE = 0.5, np.cos(np.radians(10.0))
+
+
+def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Floats) -> Parts:
+    """The parts for a walk that begins with a view; none if it begins elsewhere, or without Embree.
+
+    Parameters
+    ----------
+    catalogue: has the bytes of records and geometry on the link.
+    eye, direction: (3,)
+    """
+    views = served.index["viewpoints"]
+    # Databases of earlier releases have no site.
+    if not views or any("differences" not in row for row in served.index["textures"]):
+        return ()
+    view = views[0]
+    away = np.linalg.norm(eye - np.array(view["position"]))
+    aside = direction @ np.array(view["direction"]) / np.linalg.norm(direction)
+    if away > NEAR or aside < ALIKE:
+        return ()
+    try:
+        needs = NeedFinder(served).needs(view)
+    except ImportError:
+        return ()
+    sizes = {
+        (name, cell): int(size)
+        for name, bytes_ in (
+            ("record", catalogue.record_bytes), ("geometry", catalogue.geometry_bytes),
+        )
+        for cell, size in enumerate(bytes_)
+    }  # fmt: skip
+    parts, _ = contents_of(ordered_steps(served.index, needs, view["cell"], sizes))
+    return tuple((part.kind, part.number, part.end) for part in parts)
+
+
 #: Pixels of the item buffer that errors are summed over.
 PIXELS = (160, 90)
 #: Pixels of the item buffer of a browser, whatever the aspect of its screen.
 _ITEM_PIXELS = 3600
-#: Frames of a walk at most: some five hours.
-MOST_FRAMES = 100_000
-#: Share of the walk that may lie in no cell.
-_ASTRAY = 0.05
-#: A viewpoint is still if it moved less (metres) and turned less (cosine) in the last second.
-STILL_SECONDS, _STILL_METRES, _STILL_COSINE = 1.0, 1e-3, np.cos(np.radians(1.0))
 
 
 @dataclass(frozen=True)
@@ -52,19 +87,11 @@ class World:
     ----------
     served: the served files. pyramids: all levels of the textures. lossy: see `Lossy`.
     catalogue: the catalogue of clients.
-    views, view: the tables of the screen, and (F,) the view of each frame.
+    track: the viewpoint, frame by frame. views: the tables of the screen, by `Track.view`.
     camera: the camera of the item buffer.
-    time: (F,) s. eye, direction: (F, 3).
-    cell: (F,) cell of the eye; outside of cells the last one.
-    still: (F,) whether the viewpoint has not moved for a second.
-    rate: frames a second.
     one_range: whether a client requests one range of a file at a time, as browsers must.
     opening: kind, number and end of each part of the opening of a site, if the walk begins where
-        that is made for (`ptmtools_lab.opening`).
-    browser: conditions of a recording in a browser, or None. Times are then since navigation, and a
-        frame has the view of the available item buffer.
-    drawn: (F,) the frame in which that item buffer was drawn, -1 without one; None unless in a
-        browser.
+        that is made for.
     colored: whether clients know the mean colour of each texture; else it is grey until its first
         level arrives.
     form: form of the textures, a name in `ptmtools_lab.forms.FORMS`.
@@ -77,20 +104,12 @@ class World:
     pyramids: Pyramids
     lossy: Lossy
     catalogue: Catalogue
-    views: Views
-    view: Ints
+    track: Track
+    views: WalkViews
     camera: RayCamera
-    time: Floats
-    eye: Floats
-    direction: Floats
-    cell: Ints
-    still: Bools
-    rate: float = RATE
     colored: bool = True
     one_range: bool = False
     opening: Parts = ()
-    browser: Browser | None = None
-    drawn: Ints | None = None
     form: str = PTM
     shows: Shows | None = None
     relief: Relief | None = None
@@ -99,13 +118,7 @@ class World:
     @property
     def frames(self) -> int:
         """Number of frames."""
-        return len(self.time)
-
-    def still_after(self, seconds: float) -> Bools:
-        """(F,) the frames in which the viewpoint has not moved for ``seconds``."""
-        if seconds == STILL_SECONDS:
-            return self.still
-        return _still(self.time, self.eye, self.direction, seconds)
+        return self.track.frames
 
     def in_form(self, form: str) -> World:
         """The same world for clients with textures in a form.
@@ -135,27 +148,11 @@ class World:
     def frustum(self, frame: int) -> Frustum:
         """The view frustum of a frame."""
         aspect, angle = self.camera.aspect, self.camera.field_of_view
-        return Frustum(self.eye[frame], self.direction[frame], angle, aspect)
+        return Frustum(self.track.eye[frame], self.track.direction[frame], angle, aspect)
 
     def standing(self, seconds: float) -> World:
         """A visitor who stays at the first frame for this time."""
-        rate = RATE if self.browser else self.rate
-        count = int(np.ceil(seconds * rate)) + 1
-        first = np.zeros(count, np.int64)
-        time = np.arange(count) / rate
-        return replace(
-            self,
-            view=self.view[first],
-            time=time,
-            eye=self.eye[first],
-            direction=self.direction[first],
-            cell=self.cell[first],
-            still=time >= STILL_SECONDS,
-            rate=rate,
-            browser=None,
-            drawn=None,
-            other_forms={name: world.standing(seconds) for name, world in self.other_forms.items()},
-        )
+        return self.changed(lambda world: replace(world, track=world.track.standing(seconds)))
 
 
 def prepare(
@@ -166,12 +163,8 @@ def prepare(
     rate: float = RATE,
     pixels: tuple[int, int] = PIXELS,
     progress: Progress = silent,
-    full: Pyramids | None = None,
-    same_maps: bool = False,
-    views: Views | None = None,
-    forms: Mapping[str, Shows] | None = None,
-    relief: Relief | None = None,
-    lossy: Lossy | None = None,
+    views: WalkViews | None = None,
+    drawing: Drawing = PLAIN,
 ) -> World:
     """The world of a walk.
 
@@ -179,11 +172,8 @@ def prepare(
     ----------
     pyramids: those of this database, if already read.
     rate: frames a second. pixels: of the item buffer, across and down.
-    full, same_maps: another reference of pictures; see `look`.
     views: those of this walk, if already made.
-    forms: other forms of textures, as read by `read_forms`.
-    relief: octrees and another reference database (`relief_of`).
-    lossy: previews of this database, if already read.
+    drawing: see `Drawing`; forms as read by `read_forms`, relief by `relief_of`.
 
     Raises
     ------
@@ -191,64 +181,32 @@ def prepare(
     LimitError: PTM-L400 it is too long.
     DatabaseError, LimitError: those of `read_pyramids` and `read_lossy`.
     """
-    time, browser = frame_times(walk, rate), walk.browser
-    if browser:
-        _require_fitting(browser, served)
-        rate, time = (len(walk.time) - 1) / walk.duration, walk.time
-        eye, direction, cell = walk.eye, walk.direction, browser.cell
-        if (cell < 0).any():
-            cell = np.where(cell < 0, served.locator.along(eye), cell)
-    else:
-        eye, direction = walk.at(time)
-        cell = served.locator.along(eye)
-    astray = cell < 0
-    if astray.mean() > _ASTRAY:
-        raise InputError(
-            "PTM-I700",
-            f"{astray.mean():.0%} of the walk lies in none of the cells",
-            remedy="use a walk through this very database, such as `ptm path DB` makes",
-        )
-    known = np.maximum.accumulate(np.where(astray, -1, np.arange(len(cell))))
-    cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
+    track, poses = track_of(served, walk, rate)
+    browser, relief, forms = track.browser, drawing.relief, drawing.forms
     textures = read_pyramids(served, progress) if pyramids is None else pyramids
-    lossy = read_lossy(served, progress) if lossy is None else lossy
-    if full is None and relief and relief.reference:
-        full = relief.reference.pyramids
+    lossy = read_lossy(served, progress) if drawing.lossy is None else drawing.lossy
     camera = RayCamera(*pixels, walk.field_of_view, walk.aspect)
-    pose, drawn = np.concatenate([eye, direction], axis=1), None
-    if browser:
-        camera, drawn = _camera(walk, browser), _drawn(time, browser.age)
-        pose = pose[np.where(drawn < 0, np.arange(len(time)), drawn)]
-    seen, view = np.unique(pose, axis=0, return_inverse=True)
-    others: list[Views] = []
+    camera = _camera(walk, browser) if browser else camera
+    form_views: list[WalkViews] = []
     if views is None:
-        eyes, looks = seen[:, :3], seen[:, 3:]
-        shows = [*(forms or {}).values()]
-        views, *others = look(
-            served.surfaces, textures, camera, eyes, looks, progress, forms=shows, full=full,
-            same_maps=same_maps, relief=relief, lossy=lossy,
-        )  # fmt: skip
+        drawing = drawing._replace(lossy=lossy)
+        eyes, directions = poses[:, :3], poses[:, 3:]
+        views, *form_views = look(
+            served.surfaces, textures, camera, eyes, directions, progress, drawing
+        )
     catalogue = catalogue_of(served, textures.differences, textures.mean)
     catalogue = catalogue.with_browser_sizes(browser) if browser else catalogue
-    opening = () if browser else opening_of(served, catalogue, eye[0], direction[0])
+    eye, direction = track.eye[0], track.direction[0]
     world = World(
         served=served,
         pyramids=textures,
         lossy=lossy,
         catalogue=catalogue,
+        track=track,
         views=views,
-        view=view.reshape(-1).astype(np.int64),
         camera=camera,
-        time=time + browser.begun if browser else time,
-        eye=eye,
-        direction=direction,
-        cell=cell,
-        still=_still(time, eye, direction),
-        rate=rate,
         one_range=browser is not None,
-        opening=opening,
-        browser=browser,
-        drawn=drawn,
+        opening=() if browser else opening_of(served, catalogue, eye, direction),
         relief=relief,
     )
     other_forms = {
@@ -256,36 +214,28 @@ def prepare(
             world,
             form=name,
             catalogue=world.catalogue.in_columns(FORMS[name].columns(served, False)),
-            views=form_views,
-            shows=shown,
+            views=views_in_form,
+            shows=shows,
         )
-        for (name, shown), form_views in zip((forms or {}).items(), others, strict=True)
+        for (name, shows), views_in_form in zip(forms.items(), form_views, strict=True)
     }
     world = replace(world, other_forms=other_forms)
-    if relief is None:
-        return world
-    from ptmtools_lab.relief.stock import with_octrees, without_octrees
+    return _with_octrees(world, catalogue, relief) if relief else world
+
+
+def _with_octrees(world: World, catalogue: Catalogue, relief: Relief) -> World:
+    """The world with its octrees: without files for clients that draw none, and in the forms that
+    have them beside ``catalogue``, that of the textures alone."""
+    from ptmtools_lab.relief import with_octrees, without_octrees
 
     octrees = relief.octrees
     world = world.changed(lambda w: replace(w, catalogue=without_octrees(w.catalogue, octrees)))
     if not octrees.number:
         return world
-    drawing = [form.name for form in FORMS.values() if form.octrees]
-    fetched = with_octrees(catalogue, served, octrees)
-    more = {name: replace(world, form=name, catalogue=fetched, other_forms={}) for name in drawing}
+    names = [form.name for form in FORMS.values() if form.octrees]
+    fetched = with_octrees(catalogue, world.served, octrees)
+    more = {name: replace(world, form=name, catalogue=fetched, other_forms={}) for name in names}
     return replace(world, other_forms={**world.other_forms, **more})
-
-
-def frame_times(walk: Walk, rate: float) -> Floats:
-    """(F,) s, the times of the frames of a walk at a rate. Raises LimitError PTM-L400 if they are
-    too many."""
-    if walk.duration * rate > MOST_FRAMES:
-        raise LimitError(
-            "PTM-L400",
-            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
-            remedy="use a shorter one",
-        )
-    return np.asarray(np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate)
 
 
 def relief_of(
@@ -304,14 +254,15 @@ def relief_of(
     InputError: PTM-I700 the other database has other textures.
     DatabaseError: those of `read_octrees` and `read_pyramids`.
     """
-    from ptmtools_lab.relief.tables import Reference
+    from ptmtools_lab.relief import Reference
     from ptmtools_systems.apo.served_octrees import no_octrees, read_octrees
 
     if against is None and not lit:
         return None
     reference = None
     if against is not None:
-        names = [[row["file"] for row in each.index["textures"]] for each in (served, against)]
+        indices = served.index, against.index
+        names = [[row["file"] for row in index["textures"]] for index in indices]
         if names[0] != names[1]:
             raise InputError(
                 "PTM-I700",
@@ -337,43 +288,8 @@ def read_forms(
     return {f.name: f.shows(served, pyramids, progress) for f in known if f.shows}
 
 
-def _require_fitting(browser: Browser, served: Served) -> None:
-    previews = sum(len(row.get("previews", ())) for row in served.index["textures"])
-    for kind, present in (("preview", previews), ("mesh", sum(map(len, served.mesh_bytes)))):
-        numbers = [file.number for file in browser.files if file.kind == kind]
-        if max(numbers, default=-1) >= present:
-            raise InputError(
-                "PTM-I700",
-                f"was recorded with {kind} {max(numbers)}, and there are {present}",
-                remedy="use the database whose site it was recorded on",
-            )
-    if len(browser.record_bytes) != served.cell_count:
-        raise InputError(
-            "PTM-I700",
-            f"was recorded among {len(browser.record_bytes)} cells, not {served.cell_count}",
-            remedy="use the database whose site it was recorded on",
-        )
-
-
 def _camera(walk: Walk, browser: Browser) -> RayCamera:
     """A camera with twice as many pixels each way as the viewer's item buffer."""
     tall = max(1, round(np.sqrt(_ITEM_PIXELS / walk.aspect)))
     wide = max(1, round(_ITEM_PIXELS / tall))
     return RayCamera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)
-
-
-def _drawn(time: Floats, age: Floats) -> Ints:
-    """(F,) the frame in which the available item buffer of each frame was drawn, -1 without one."""
-    # The time of an item buffer is the beginning of its frame, that of a frame its end.
-    frames: Ints = np.where(age < 0, -1, np.searchsorted(time, time - age, "right"))
-    return frames
-
-
-def _still(time: Floats, eye: Floats, direction: Floats, seconds: float = STILL_SECONDS) -> Bools:
-    still = np.zeros(len(time), dtype=bool)
-    begin = np.searchsorted(time, time - seconds - 1e-9)
-    for f in np.flatnonzero(time >= seconds).tolist():
-        last = slice(int(begin[f]), f + 1)
-        moved = np.abs(eye[last] - eye[f]).max()
-        still[f] = moved < _STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
-    return still

@@ -34,7 +34,8 @@ from ptmtools.scene.model import Scene
 from ptmtools.walk import Walk
 from ptmtools_lab.allocation import allocate
 from ptmtools_lab.measures import flip
-from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.renderer import FrameRenderer
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare
 
 WIDTH, HEIGHT, _SAMPLES = 320, 240, 3
@@ -63,7 +64,7 @@ def measured(
     walk = _standing(viewpoint)
     full = read_pyramids(served)
     world = prepare(served, walk, full, pixels=(WIDTH, HEIGHT))
-    sight = Renderer(world, HEIGHT, _SAMPLES).look(walk.eye[0], walk.direction[0])
+    sight = FrameRenderer(world, HEIGHT, _SAMPLES).look(walk.eye[0], walk.direction[0])
     rounded = _rounded(full)
     actual = []
     for form in (LOSSLESS, *BLOCK_BYTES):
@@ -71,10 +72,12 @@ def measured(
             own, cost, true = world, world.catalogue.memory, full
         else:
             coded = _decoded(full, served, scene, form)
-            own = prepare(served, walk, coded, pixels=(WIDTH, HEIGHT), full=rounded)
+            own = prepare(
+                served, walk, coded, pixels=(WIDTH, HEIGHT), drawing=Drawing(full=rounded)
+            )
             cost, true = _blocks(full, BLOCK_BYTES[form]), rounded
-        drawn = Renderer(own, HEIGHT, _SAMPLES)
-        reference = Renderer(replace(own, pyramids=true), HEIGHT, _SAMPLES).full(sight)
+        drawn = FrameRenderer(own, HEIGHT, _SAMPLES)
+        reference = FrameRenderer(replace(own, pyramids=true), HEIGHT, _SAMPLES).full(sight)
         worth = _worth(own)
         there = np.ones(served.cell_count, dtype=np.bool_)
         for budget in budgets:

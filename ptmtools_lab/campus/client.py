@@ -32,7 +32,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.stock import Stock
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_systems.campus.model import Quality, distances
 
 #: Number of the index among the files.
@@ -54,7 +54,7 @@ class CampusClient:
     """
 
     def __init__(
-        self, stock: Stock, link: Link, quality: Quality, options: CampusWalkOptions
+        self, stock: Stock, link: FluidLink, quality: Quality, options: CampusWalkOptions
     ) -> None:
         self.stock, self.link, self.quality, self.options = stock, link, quality, options
         self.order: Ints = np.zeros(0, np.int64)
@@ -134,33 +134,33 @@ class CampusClient:
                 return
         self._sorted_at = self._eye
         self.sorts += 1
-        far = distances(self._eye, self.stock.boxes, self.stock.barycentres)
-        self.order = np.argsort(far, kind="stable")
+        distance = distances(self._eye, self.stock.boxes, self.stock.barycentres)
+        self.order = np.argsort(distance, kind="stable")
         self.near = tuple(self.order[: self.options.nearest].tolist())
         self._make_room()
 
     def _make_room(self) -> None:
         budget = self.options.budget
         self._room = np.zeros(len(self.stock.names), dtype=np.bool_)
-        left, low = self._filled(self.order.tolist(), self.low, budget)
-        _, high = self._filled(self.near, self.high, left)
+        remaining, low = self._filled(self.order.tolist(), self.low, budget)
+        _, high = self._filled(self.near, self.high, remaining)
         self._wanted = [low, high]
 
     def _filled(
-        self, objects: Iterable[int], files: list[tuple[int, ...]], left: int | None
+        self, objects: Iterable[int], files: list[tuple[int, ...]], remaining: int | None
     ) -> tuple[int | None, deque[int]]:
         """The rest of a budget, None without one, and the objects that fit."""
         chosen: deque[int] = deque()
         for number in objects:
             new = [f for f in files[number] if not self._room[f]]
             size = int(self.stock.most[new].sum())
-            if left is not None:
-                if size > left:
+            if remaining is not None:
+                if size > remaining:
                     continue
-                left -= size
+                remaining -= size
             self._room[new] = True
             chosen.append(number)
-        return left, chosen
+        return remaining, chosen
 
     def _job(self) -> deque[int] | None:
         """The files of the nearest object that are not yet requested; low detail of all objects

@@ -23,8 +23,8 @@ from ptmtools_lab.campus.options import QUALITIES, CampusWalkOptions
 from ptmtools_lab.campus.stock import Stock
 from ptmtools_lab.campus.world import COARSE, FINE, NOTHING, CampusWorld
 from ptmtools_lab.measures import STANDS, Measures, measure, seconds_to
-from ptmtools_lab.network import Link
-from ptmtools_lab.simulation import Run
+from ptmtools_lab.network import FluidLink
+from ptmtools_lab.simulation import WalkRun
 from ptmtools_lab.world import World
 from ptmtools_systems.campus.model import SIZES, Quality
 
@@ -112,8 +112,8 @@ class CampusRun:
     def reused(self) -> float:
         """Share of the preset's textures that were loaded when an object that uses them first
         became one of the nearest; 0 without textures."""
-        textures = sum(each.textures for each in self.meetings)
-        return sum(each.reused for each in self.meetings) / max(textures, 1)
+        textures = sum(meeting.textures for meeting in self.meetings)
+        return sum(meeting.reused for meeting in self.meetings) / max(textures, 1)
 
     @property
     def idle_share(self) -> float:
@@ -136,7 +136,7 @@ def simulate_campus(
 ) -> CampusRun:
     """Simulates a walk. The same arguments give the same run, bit for bit. ``conditions`` replace
     the link of the options and the trace."""
-    link = Link(conditions or options.link(trace))
+    link = FluidLink(conditions or options.link(trace))
     client = CampusClient(world.stock, link, quality, options)
     frames, columns = world.frames, _Columns(world.stock)
     wanted = min(max(options.nearest, 1), world.stock.objects)
@@ -197,9 +197,9 @@ class _Columns:
     def __init__(self, stock: Stock) -> None:
         lods = [stock.meshes(number) for number in range(stock.objects)]
         self._coarse, self._fine = (
-            np.array([each[i] for each in lods], dtype=np.int64) for i in (0, -1)
+            np.array([item[i] for item in lods], dtype=np.int64) for i in (0, -1)
         )
-        meshes = [each.meshes for each in stock.campus.objects]
+        meshes = [item.meshes for item in stock.campus.objects]
         self.faces = np.array([[0, m[0].faces, m[-1].faces] for m in meshes], dtype=np.int64)
         bases = range(len(stock.bases))
         self._file = np.array(
@@ -285,36 +285,36 @@ CAMPUS_POLICIES = {
 
 def measure_campus_walk(
     place: CampusWorld, world: World, policy: CampusPolicy, link: Conditions, budget: int | None
-) -> tuple[Run, Measures]:
+) -> tuple[WalkRun, Measures]:
     """A run through a campus, and its measures; ``world`` is the same walk through the database."""
     tables = place.tables
     if tables is None:
         raise ValueError("the errors of the campus are not tabulated")
-    run = _run(place, world.still, policy, link, budget)
+    run = _run(place, world.track.still, policy, link, budget)
     stands = place.standing(STANDS)
     standing = _run(stands, np.ones(stands.frames, np.bool_), policy, link, budget)
     nothing = np.zeros(place.stock.objects, np.int64), np.zeros(len(place.stock.bases), np.int64)
-    left = tables.wrong(int(place.view[0]), *nothing)
+    nothing_loaded = tables.wrong(int(place.view[0]), *nothing)
     measures = replace(
         measure(run, world, standing),
         waste=nan,
         stalls=nan,
         uploads=nan,
         switches=nan,
-        final=seconds_to(standing, left),
+        final=seconds_to(standing, nothing_loaded),
     )
     return run, measures
 
 
 def _run(
     place: CampusWorld, still: Bools, policy: CampusPolicy, link: Conditions, budget: int | None
-) -> Run:
+) -> WalkRun:
     memory = "inf" if budget is None else str(max(budget, 1))
     options = CampusWalkOptions(memory=memory, lightmaps=False)
     run = simulate_campus(place, policy.quality, options, conditions=link)
     frames = place.frames
     unknown = np.full(frames, nan)
-    return Run(
+    return WalkRun(
         policy=policy.name,
         conditions=link,
         budget=int(run.memory.max()) if budget is None else budget,

@@ -94,10 +94,10 @@ class Stock:
 
     def high(self, number: int, quality: Quality, lightmaps: bool) -> tuple[int, ...]:
         """Files of an object in high detail: its finest mesh, textures and lightmap of a preset."""
-        each = self.campus.objects[number]
+        item = self.campus.objects[number]
         files = [self.meshes(number)[-1], *self.textures(number, quality.diffuse)]
-        if lightmaps and each.lightmap is not None:
-            files.append(self._number[texture_file(each.lightmap, quality.light, LIGHT)])
+        if lightmaps and item.lightmap is not None:
+            files.append(self._number[texture_file(item.lightmap, quality.light, LIGHT)])
         return tuple(files)
 
     def textures(self, number: int, size: int) -> tuple[int, ...]:
@@ -132,7 +132,7 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
     """
     folder = Path(folder)
     campus = read_campus(folder)
-    kept = tuple(each for each in campus.objects if fnmatchcase(each.name, only))
+    kept = tuple(item for item in campus.objects if fnmatchcase(item.name, only))
     if not kept:
         raise InputError(
             "PTM-I302",
@@ -146,7 +146,7 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
     sizes = {texture.file: texture.size for texture in campus.textures}
     # A visitor asks for the records of objects.
     files = {
-        name: each for name, each in campus.files().items() if not name.startswith(f"{RECORDS}/")
+        name: item for name, item in campus.files().items() if not name.startswith(f"{RECORDS}/")
     }
     for name in files:
         data = file_bytes(folder, name, files[name])
@@ -155,14 +155,14 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
             rows.append((len(data), len(data), taken, taken))
         else:
             rows.append((on_link(data), len(data), _held(folder, name, data), len(data)))
-    sent, stored, memory, most = np.array(rows, dtype=np.int64).T.copy()
+    sent, stored, memory, largest = np.array(rows, dtype=np.int64).T.copy()
     stock = Stock(
         campus=campus,
         names=(INDEX, *files),
         sent=sent,
         stored=stored,
         memory=memory,
-        most=most,
+        most=largest,
         boxes=np.array([o.box for o in campus.objects], dtype=np.float64).reshape(-1, 6),
         barycentres=np.array([o.barycentre for o in campus.objects]).reshape(-1, 3),
         bases=_bases(campus),
@@ -183,11 +183,11 @@ def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -
     return data
 
 
-def _bytes(folder: Path, name: str, most: int) -> bytes:
-    """Reads a file, at most ``most`` bytes and one more."""
+def _bytes(folder: Path, name: str, limit: int) -> bytes:
+    """Reads a file, at most ``limit`` bytes and one more."""
     try:
         with open_below(folder, name) as stream:
-            return stream.read(most + 1)
+            return stream.read(limit + 1)
     except OSError as fault:
         raise refused(folder / name, f"cannot be read ({fault.strerror or fault})") from None
 
@@ -212,7 +212,7 @@ def _mipped(side: int) -> int:
 
 def _bases(campus: Campus) -> tuple[str, ...]:
     """Bases with colours that some object uses."""
-    used = {number for each in campus.objects for number in each.materials}
+    used = {number for item in campus.objects for number in item.materials}
     named = [
         m.base
         for number, m in enumerate(campus.materials)
@@ -224,9 +224,9 @@ def _bases(campus: Campus) -> tuple[str, ...]:
 def _require_textures(folder: Path, stock: Stock) -> None:
     """Checks that the index lists each file that an object may want."""
     campus = stock.campus
-    for number, each in enumerate(campus.objects):
-        if max(each.materials, default=-1) >= len(campus.materials):
-            raise refused(folder / INDEX, f"{each.name} has a material that there is not")
+    for number, item in enumerate(campus.objects):
+        if max(item.materials, default=-1) >= len(campus.materials):
+            raise refused(folder / INDEX, f"{item.name} has a material that there is not")
         try:
             stock.low(number)
             for quality in PRESETS:
@@ -250,8 +250,8 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
     """
     campus = stock.campus
     rows: list[tuple[int, Primitive]] = []
-    for number, each in enumerate(campus.objects):
-        name = each.meshes[level].file
+    for number, item in enumerate(campus.objects):
+        name = item.meshes[level].file
         try:
             primitives = read_mesh(file_bytes(folder, name))
         except ValueError as fault:

@@ -14,7 +14,7 @@ fine one. Where the coarse mesh covers more, the pixel belongs to the object beh
 kind of that. A ray that hits nothing is black, as in pictures of other clients.
 
 Where only the full picture, or only the meshes, show something, the meshes differ from the full
-picture: that part of the error is in every run (`Tables.least`).
+picture: that part of the error is in every run (`CampusTables.least`).
 """
 
 from __future__ import annotations
@@ -22,29 +22,108 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.errors import InputError
+from ptmtools.jit import plain_kernel
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
+from ptmtools.rendering.kernels import GREY, blend, distance, texel_under
 from ptmtools.rendering.pyramids import full_colors, read_pyramids
 from ptmtools.rendering.rays import Caster, Frustum, RayCamera
-from ptmtools.rendering.records import Pyramids, triangles_of
+from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
 from ptmtools.walk import Walk
 from ptmtools_lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
-from ptmtools_lab.world import PIXELS, RATE, frame_times
+from ptmtools_lab.track import RATE, frame_times
+from ptmtools_lab.world import PIXELS
 from ptmtools_systems.campus.model import SIZES
+
+#: Columns of a table: grey, and each size of a texture.
+COLUMNS = 4
+
+
+class Sizes(NamedTuple):
+    """Textures in each size."""
+
+    small: Pyramids
+    middle: Pyramids
+    large: Pyramids
+
+
+@plain_kernel
+def color_of(
+    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, color: Floats, work: Floats
+) -> None:
+    """Writes the colour of a pixel to ``color`` (3,), 0 to 255; black if the pixel shows nothing.
+
+    ``work`` (4, 3) is scratch memory.
+    """
+    f = sight.triangle[i]
+    if f < 0:
+        color[:] = 0.0
+        return
+    t = triangles.texture[f]
+    if t < 0:
+        color[:] = 255.0
+    else:
+        u, v, detail = texel_under(sight, i, triangles, textures, t, work[:3])
+        blend(textures, t, detail, u, v, triangles.clamped[f], color, work[3])
+    for k in range(3):
+        color[k] *= triangles.color[f, k]
+
+
+@plain_kernel
+def add_shown(
+    owner: Ints,
+    sight: Sight,
+    triangles: Triangles,
+    sizes: Sizes,
+    exact: Floats,
+    place: Ints,
+    sums: Floats,
+    work: Floats,
+) -> None:
+    """Adds the errors of the pixels of a frame as one kind of mesh shows them.
+
+    Parameters
+    ----------
+    owner: (n,) object of each pixel, -1 for none.
+    exact: (n, 3) colours of the full picture.
+    place: (m, T + 1) row of an object and a texture; the last is without texture.
+    sums: (rows, `COLUMNS`) of root mean squares over R, G and B.
+    work: (5, 3) scratch memory.
+    """
+    shown = work[4]
+    for i in range(len(owner)):
+        o = owner[i]
+        if o < 0:
+            continue
+        f = sight.triangle[i]
+        t = triangles.texture[f] if f >= 0 else -1
+        row = place[o, t]
+        shown[:] = GREY
+        sums[row, 0] += np.sqrt(distance(shown, exact[i]))
+        color_of(sight, i, triangles, sizes.small, shown, work[:4])
+        sums[row, 1] += np.sqrt(distance(shown, exact[i]))
+        if t >= 0:
+            color_of(sight, i, triangles, sizes.middle, shown, work[:4])
+        sums[row, 2] += np.sqrt(distance(shown, exact[i]))
+        if t >= 0:
+            color_of(sight, i, triangles, sizes.large, shown, work[:4])
+        sums[row, 3] += np.sqrt(distance(shown, exact[i]))
+
 
 #: Display state of an object.
 NOTHING, COARSE, FINE = range(3)
 
 
 @dataclass(frozen=True)
-class Tables:
+class CampusTables:
     """Errors of the frames; the rows of a frame are ``start[f]`` to ``start[f + 1]``.
 
     Attributes
@@ -95,9 +174,8 @@ def look(
     eye: Floats,
     direction: Floats,
     progress: Progress = silent,
-) -> Tables:
+) -> CampusTables:
     """The tables of (F, 3) eyes and directions; ``cell`` of the surfaces is the object."""
-    from ptmtools_lab.campus.kernels import COLUMNS, Sizes, add_shown
 
     objects = int(max(finest.cell.max(initial=-1), coarsest.cell.max(initial=-1))) + 1
     wide = len(sizes[0].levels) + 1
@@ -114,7 +192,7 @@ def look(
     least = np.zeros(len(eye))
     for f in range(len(eye)):
         progress(f, len(eye), "looking along the walk")
-        coarse, fine = (each.look(camera, eye[f], direction[f]) for _, each, _ in kinds)
+        coarse, fine = (surfaces.look(camera, eye[f], direction[f]) for _, surfaces, _ in kinds)
         sight = fine if one_picture else caster.look(camera, eye[f], direction[f])
         exact = full_colors(sight, triangles, full.textures)
         owner = _owners((fine.triangle, finest), (coarse.triangle, coarsest))
@@ -131,7 +209,7 @@ def look(
         least[f] = np.sqrt((unowned**2).mean(axis=1)).sum() / pixels
     progress(len(eye), len(eye), "looking along the walk")
     number, texture, kind = np.concatenate(rows).T
-    return Tables(
+    return CampusTables(
         np.array(start), number.astype(np.int32), texture.astype(np.int32), kind.astype(np.int8),
         np.concatenate(errors), least,
     )  # fmt: skip
@@ -159,7 +237,7 @@ class CampusWorld:
     """
 
     stock: Stock
-    tables: Tables | None
+    tables: CampusTables | None
     view: Ints
     time: Floats
     eye: Floats
@@ -180,10 +258,10 @@ class CampusWorld:
     def standing(self, seconds: float) -> CampusWorld:
         """A visitor who stays at the first frame for this time."""
         count = int(np.ceil(seconds * self.rate)) + 1
-        held = np.zeros(count, np.int64)
+        first = np.zeros(count, np.int64)
         time = np.arange(count) / self.rate
         return replace(
-            self, view=self.view[held], time=time, eye=self.eye[held], seen=self.seen[held]
+            self, view=self.view[first], time=time, eye=self.eye[first], seen=self.seen[first]
         )
 
 

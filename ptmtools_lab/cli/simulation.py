@@ -43,6 +43,7 @@ from ptmtools_lab.path.making import path_through
 from ptmtools_lab.path.options import PathOptions
 from ptmtools_lab.policies.paper import PaperOptions
 from ptmtools_lab.report import as_csv, document, table
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import prepare, read_forms, relief_of
 
 #: Rooms that are listed without ``-v``.
@@ -90,9 +91,9 @@ def path_command(console: Console, db: str, output: str, force: bool, **values: 
         f"{output}: {len(path.visited):,} of {count(path.rooms, 'room')}, "
         f"{path.walk.length:.0f} m in {path.walk.duration:.0f} s, {count(path.stops, 'stop')}"
     ]
-    left = path.rooms - len(path.visited) - len(path.unreachable)
-    if left and options.duration is not None:
-        lines.append(f"a longer --duration visits {count(left, 'more room')}")
+    unvisited = path.rooms - len(path.visited) - len(path.unreachable)
+    if unvisited and options.duration is not None:
+        lines.append(f"a longer --duration visits {count(unvisited, 'more room')}")
     if not path.walk.length:
         lines.append("the walk stays in one place: no other is reachable")
     if path.unreachable:
@@ -153,11 +154,11 @@ def walk_campus(
     The output is Markdown: a row for each measure, and the MB received per half minute.
     """
     options = take(CampusWalkOptions, values)
-    from ptmtools_lab.campus import charts, report
+    from ptmtools_lab import campus_report as report
     from ptmtools_lab.campus.simulation import simulate_campus
 
     if plot_file is not None:
-        charts.form_of(plot_file)
+        report.form_of(plot_file)
         check_writable(plot_file, force=force)
         figures.require()
     walk = read_walk(walk_file)
@@ -167,7 +168,7 @@ def walk_campus(
         world = prepare_campus(campus, walk, served, every=every, only=only, progress=progress)
     runs = [simulate_campus(world, quality, options, trace) for quality in options.qualities]
     if plot_file is not None:
-        write_bytes(plot_file, charts.picture(runs, charts.form_of(plot_file)), force=force)
+        write_bytes(plot_file, report.picture(runs, report.form_of(plot_file)), force=force)
     head = (
         f"{walk.length:.0f} m in {walk.duration:.0f} s, {world.stock.objects:,} objects, "
         f"{options.bandwidth}bit/s, {options.latency}\n"
@@ -291,24 +292,24 @@ def simulate(
     _check_campus(options, campus, drawn=bool(frames_to or strip_file))
     trace = read_trace(trace_file) if trace_file else None
     walks = {file: read_walk(file) for file in walk_file} or _new_walks(db, seeds)
-    served, other = read_served(db), read_served(against) if against else None
+    served, compared = read_served(db), read_served(against) if against else None
     if options.lit:
-        served, other = with_lamp(served), with_lamp(other) if other else None
+        served, compared = with_lamp(served), with_lamp(compared) if compared else None
     require_hints(served, options.policies)
     with console.progress() as progress:
         pyramids = read_pyramids(served, progress)
-        relief = relief_of(served, pyramids, other, lit=options.lit, progress=progress)
+        relief = relief_of(served, pyramids, compared, lit=options.lit, progress=progress)
         shown = relief.reference.pyramids if relief and relief.reference else pyramids
         campuses = {
-            name: prepare_campus(campus, walk, other or served, shown, progress=progress)
+            name: prepare_campus(campus, walk, compared or served, shown, progress=progress)
             for name, walk in walks.items()
             if campus
         }
         forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
+        drawing = Drawing(forms=forms, relief=relief)
         worlds = {
             name: counted(
-                prepare(served, walk, pyramids, progress=progress, forms=forms, relief=relief),
-                options,
+                prepare(served, walk, pyramids, progress=progress, drawing=drawing), options
             )
             for name, walk in walks.items()
         }
@@ -325,11 +326,11 @@ def simulate(
             write_bytes(frames_to / name, data, force=force)
     if strip_file:
         write_bytes(strip_file, figures.strip(first, played[0], paper), force=force)
-    own = paper if with_paper else None
+    paper_options = paper if with_paper else None
     lines = table(played, worlds, lit=options.lit, against=against, campuses=campuses)
     if given := arguments([paper]):
         lines.insert(0, f"policy paper with {' '.join(given)}")
-    result = document(db, played, worlds, lit=options.lit, against=against, paper=own)
+    result = document(db, played, worlds, lit=options.lit, against=against, paper=paper_options)
     console.result(result, lines)
 
 

@@ -3,7 +3,7 @@
 A step costs metres, and more where it is narrow or steep or leads over furniture, so that the
 cheapest way is one that a visitor would take.
 
-`Obstacles` blocks bodies and eyes: rays against the whole model, glass and furniture included,
+`WalkObstacles` blocks bodies and eyes: rays against the whole model, glass and furniture included,
 except open door leaves. Embree computes in single precision, here around the middle of the model.
 
 `over_floors` places the eye over floors, on a grid. The eye region's floor (`Cells.eye_floor`) is
@@ -19,6 +19,7 @@ cost.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,73 @@ from ptmtools.arrays import Bools, Floats, Ints, ranges
 from ptmtools.cells.model import Cells, EyeRegion
 from ptmtools.cells.options import Walker
 from ptmtools.embree import ray_tree
+from ptmtools.jit import kernel
 from ptmtools.scene.model import Scene
 
 
+@kernel
+def nearest_goal(start: Ints, target: Ints, cost: Floats, source: int, goal: Bools) -> Ints:
+    """Dijkstra's algorithm from a ``source`` to the nearest of the (n,) ``goal`` places: the places
+    on the way, or none."""
+    count = len(start) - 1
+    least = np.full(count, np.inf)
+    before = np.full(count, -1, dtype=np.int64)
+    least[source] = 0.0
+    heap = [(0.0, source)]
+    nearest = -1
+    while len(heap):
+        paid, place = heappop(heap)
+        if paid > least[place]:
+            continue
+        if goal[place]:
+            nearest = place
+            break
+        for step in range(start[place], start[place + 1]):
+            to, sum_ = target[step], paid + cost[step]
+            if sum_ < least[to]:
+                least[to] = sum_
+                before[to] = place
+                heappush(heap, (sum_, to))
+    length, place = 0, nearest
+    while place >= 0:
+        length += 1
+        place = before[place]
+    way = np.empty(length, dtype=np.int64)
+    place = nearest
+    while place >= 0:
+        length -= 1
+        way[length] = place
+        place = before[place]
+    return way
+
+
+@kernel
+def spread_parts(start: Ints, target: Ints, part: Ints) -> int:
+    """Writes the number of the connected part of each place to (n,) ``part``, all -1 before;
+    returns the number of parts."""
+    waiting = np.empty(len(part), dtype=np.int64)
+    parts = 0
+    for first in range(len(part)):
+        if part[first] >= 0:
+            continue
+        part[first] = parts
+        waiting[0] = first
+        count = 1
+        while count:
+            count -= 1
+            place = waiting[count]
+            for step in range(start[place], start[place + 1]):
+                to = target[step]
+                if part[to] < 0:
+                    part[to] = parts
+                    waiting[count] = to
+                    count += 1
+        parts += 1
+    return parts
+
+
 @dataclass(frozen=True)
-class Ground:
+class WalkGround:
     """Places of the eye, and the steps between them.
 
     Attributes
@@ -50,17 +113,16 @@ class Ground:
     cost: Floats
 
     @staticmethod
-    def of(eye: Floats, cell: Ints, space: Floats, steps: Ints, cost: Floats) -> Ground:
+    def of(eye: Floats, cell: Ints, space: Floats, steps: Ints, cost: Floats) -> WalkGround:
         """From (k, 2) steps, walkable in both directions, and their (k,) costs."""
         both = np.concatenate([steps, steps[:, ::-1]])
         order = np.lexsort((both[:, 1], both[:, 0]))
         start = np.searchsorted(both[order, 0], np.arange(len(eye) + 1))
-        return Ground(eye, cell, space, start, both[order, 1], np.tile(cost, 2)[order])
+        return WalkGround(eye, cell, space, start, both[order, 1], np.tile(cost, 2)[order])
 
-    def main_part(self, standing: Bools) -> Ground:
+    def main_part(self, standing: Bools) -> WalkGround:
         """The connected part that reaches most of the (C,) ``standing`` cells; of equal parts the
         one with most places."""
-        from ptmtools_lab.path.ground_kernels import spread_parts
 
         if not len(self.eye):
             return self
@@ -72,18 +134,17 @@ class Ground:
         cells, places = np.bincount(reached, minlength=parts), np.bincount(part)
         return self._kept(part == np.lexsort((-places, -cells))[0])
 
-    def _kept(self, kept: Bools) -> Ground:
+    def _kept(self, kept: Bools) -> WalkGround:
         name = np.cumsum(kept) - 1
         source = np.repeat(np.arange(len(self.eye)), np.diff(self.start))
-        held = kept[source] & kept[self.target]
-        start = np.searchsorted(name[source[held]], np.arange(int(kept.sum()) + 1))
-        target, cost = name[self.target[held]], self.cost[held]
-        return Ground(self.eye[kept], self.cell[kept], self.space[kept], start, target, cost)
+        inside = kept[source] & kept[self.target]
+        start = np.searchsorted(name[source[inside]], np.arange(int(kept.sum()) + 1))
+        target, cost = name[self.target[inside]], self.cost[inside]
+        return WalkGround(self.eye[kept], self.cell[kept], self.space[kept], start, target, cost)
 
     def way_to_nearest(self, source: int, goal: Bools) -> Ints:
         """The places on the cheapest way from ``source`` to the nearest of the (n,) ``goal``
         places, both ends included; none without a way."""
-        from ptmtools_lab.path.ground_kernels import nearest_goal
 
         return np.asarray(nearest_goal(self.start, self.target, self.cost, source, goal))
 
@@ -92,7 +153,7 @@ class Ground:
 _RAYS = 1 << 16
 
 
-class Obstacles:
+class WalkObstacles:
     """The triangles of a scene that block a walker."""
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
@@ -113,7 +174,7 @@ class Obstacles:
         """The first hits of rays from (n, 3) points along (n, 3) vectors within a ``reach``: (n,)
         the scene's triangle, or -1, and (n,) the distance, or the reach; in lengths of the
         vectors."""
-        met, far = np.full(len(points), -1, dtype=np.int64), np.full(len(points), reach)
+        met, distance = np.full(len(points), -1, dtype=np.int64), np.full(len(points), reach)
         for row in range(0, len(points) if self._tree is not None else 0, _RAYS):
             some = slice(row, row + _RAYS)
             origin = np.ascontiguousarray(points[some] - self._middle, dtype=np.float32)
@@ -121,8 +182,8 @@ class Obstacles:
             limit = np.full(len(origin), reach, dtype=np.float32)
             hit = self._tree.run(origin, direction, dists=limit, output=True)
             met[some] = self._which[hit["primID"]]
-            far[some] = np.where(met[some] >= 0, hit["tfar"], reach)
-        return met, far
+            distance[some] = np.where(met[some] >= 0, hit["tfar"], reach)
+        return met, distance
 
 
 #: Metres between places; and the finer grid, as a share, in cells that the first one misses.
@@ -142,7 +203,7 @@ _BESIDE, _NARROW, _STEEP, _THROUGH = 4.0, 10.0, 3.0, 20.0
 _STEP_RAYS = 8
 
 
-def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground:
+def over_floors(cells: Cells, obstacles: WalkObstacles, eye_height: float) -> WalkGround:
     """Places an eye's height, metres, above floors, and the steps between them."""
     eyes, walker = cells.eyes, cells.walker
     point, firm = _surfaces(cells.eye_floor, GRID, eyes, obstacles, walker, eye_height)
@@ -158,7 +219,7 @@ def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground
         firm = np.append(firm, present[extra])
     steps = _steps(point, walker, eyes, obstacles)
     space = np.where(firm, _space(point, obstacles, eye_height), 0.0)
-    return Ground.of(
+    return WalkGround.of(
         point, cell, space, steps, _cost(point, space, steps, obstacles, walker, eye_height)
     )
 
@@ -179,7 +240,7 @@ def _surfaces(
     floor: Floats,
     grid: float,
     eyes: EyeRegion,
-    obstacles: Obstacles,
+    obstacles: WalkObstacles,
     walker: Walker,
     eye_height: float,
 ) -> tuple[Floats, Bools]:
@@ -190,8 +251,8 @@ def _surfaces(
     inside = eyes.contains(eye)
     column, eye = column[inside], eye[inside]
     down = np.tile([0.0, -1.0, 0.0], (len(eye), 1))
-    _, far = obstacles.first(eye, down, 2 * eye_height)
-    underfoot = abs(far - eye_height) <= _UNDERFOOT * walker.step
+    _, depth = obstacles.first(eye, down, 2 * eye_height)
+    underfoot = abs(depth - eye_height) <= _UNDERFOOT * walker.step
     chosen = _footholds(column, eye[:, 1], underfoot, walker.step)
     return eye[chosen], underfoot[chosen]
 
@@ -212,10 +273,10 @@ def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
     meets = (edge[row, :, 0] != 0) & (share >= 0) & (share <= 1)
     crossing = plan[row, :, 1] + share * edge[row, :, 1]
     least = np.ceil(np.where(meets, crossing, np.inf).min(axis=1))
-    most = np.floor(np.where(meets, crossing, -np.inf).max(axis=1))
-    some = most >= least
+    last = np.floor(np.where(meets, crossing, -np.inf).max(axis=1))
+    some = last >= least
     row, across, first = row[some], across[some], least[some].astype(np.int64)
-    count = most[some].astype(np.int64) - first + 1
+    count = last[some].astype(np.int64) - first + 1
     column = np.column_stack([np.repeat(across, count), ranges(first, count)])
     row = np.repeat(row, count)
     # Heights, by barycentric coordinates.
@@ -230,18 +291,18 @@ def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
 def _footholds(column: Ints, height: Floats, present: Bools, step: float) -> Ints:
     """The surfaces in each column that support a foot: existing ones before others, the upper
     before the lower, and none less than a step from another."""
-    left = np.lexsort((-height, ~present, column[:, 1], column[:, 0]))
-    kept = [left[:0]]
-    while len(left):
-        same = (np.diff(column[left], axis=0) == 0).all(axis=1)
+    candidates = np.lexsort((-height, ~present, column[:, 1], column[:, 0]))
+    kept = [candidates[:0]]
+    while len(candidates):
+        same = (np.diff(column[candidates], axis=0) == 0).all(axis=1)
         first = np.flatnonzero(np.append(True, ~same))
-        best = np.repeat(left[first], np.diff(np.append(first, len(left))))
-        kept.append(left[first])
-        left = left[abs(height[left] - height[best]) > step]
+        best = np.repeat(candidates[first], np.diff(np.append(first, len(candidates))))
+        kept.append(candidates[first])
+        candidates = candidates[abs(height[candidates] - height[best]) > step]
     return np.sort(np.concatenate(kept))
 
 
-def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles) -> Ints:
+def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: WalkObstacles) -> Ints:
     """(k, 2) pairs of places between which an eye can move in a step."""
     reach = 1.5 * GRID
     box = np.floor(point[:, [0, 2]] / reach).astype(np.int64)
@@ -253,11 +314,11 @@ def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles)
     for neighbour in (0, 1, wide - 1, wide, wide + 1):
         low = np.searchsorted(key[order], key + neighbour)
         count = np.searchsorted(key[order], key + neighbour, "right") - low
-        one, other = np.repeat(np.arange(len(point)), count), order[ranges(low, count)]
-        far = point[other] - point[one]
-        near = (np.hypot(far[:, 0], far[:, 2]) <= reach) & (abs(far[:, 1]) <= walker.step)
-        near &= (one < other) | (neighbour > 0)
-        pairs.append(np.column_stack([one, other])[near])
+        source, target = np.repeat(np.arange(len(point)), count), order[ranges(low, count)]
+        offset = point[target] - point[source]
+        near = (np.hypot(offset[:, 0], offset[:, 2]) <= reach) & (abs(offset[:, 1]) <= walker.step)
+        near &= (source < target) | (neighbour > 0)
+        pairs.append(np.column_stack([source, target])[near])
     steps = np.concatenate(pairs)
     steps = steps[np.lexsort((steps[:, 1], steps[:, 0]))]
     start, end = point[steps[:, 0]], point[steps[:, 1]]
@@ -265,7 +326,7 @@ def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles)
     return steps[~obstacles.crossed(point[steps[:, 0]], point[steps[:, 1]])]
 
 
-def _space(point: Floats, obstacles: Obstacles, eye_height: float) -> Floats:
+def _space(point: Floats, obstacles: WalkObstacles, eye_height: float) -> Floats:
     """(n,) metres to the nearest obstacle on one level with the body, at most `ABOUT`."""
     angle = 2 * np.pi * (np.arange(_STEP_RAYS) + 0.5) / _STEP_RAYS
     space = np.full(len(point), ABOUT)
@@ -281,7 +342,7 @@ def _cost(
     point: Floats,
     space: Floats,
     steps: Ints,
-    obstacles: Obstacles,
+    obstacles: WalkObstacles,
     walker: Walker,
     eye_height: float,
 ) -> Floats:

@@ -23,10 +23,10 @@ from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.store.layout import SERVED
 from ptmtools.walk import DIGITS, Walk
-from ptmtools_lab.path.ground import ABOUT, Ground, Obstacles, over_floors
+from ptmtools_lab.path.ground import ABOUT, WalkGround, WalkObstacles, over_floors
 from ptmtools_lab.path.motion import Motion, Smoother, directions
 from ptmtools_lab.path.options import PathOptions
-from ptmtools_lab.path.tour import Leg, Views, middles_of, tour
+from ptmtools_lab.path.tour import Leg, StopViews, middles_of, tour
 
 Triple = tuple[float, float, float]
 #: Cell, position in metres, and unit direction of each viewpoint.
@@ -35,7 +35,7 @@ Viewpoints = Sequence[tuple[int, Triple, Triple]]
 _NEAR = 1.0
 
 
-def beginning(ground: Ground, viewpoints: Viewpoints, seed: int) -> Leg | None:
+def beginning(ground: WalkGround, viewpoints: Viewpoints, seed: int) -> Leg | None:
     """A stand at a viewpoint in its direction: at the first usable one for seed 1, the next for
     seed 2, and so on around; None if there is none."""
     legs = []
@@ -52,7 +52,7 @@ def beginning(ground: Ground, viewpoints: Viewpoints, seed: int) -> Leg | None:
 _SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
 
-def through_portals(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground:
+def through_portals(cells: Cells, obstacles: WalkObstacles, eye_height: float) -> WalkGround:
     """Places at the eye's height, metres, above the lowest points of leaves, and in portals."""
     leaf = np.array([_in_leaf(cells, i, eye_height) for i in range(cells.leaf_count)])
     portal = np.array([_in_portal(cells, k, leaf) for k in range(cells.portal_count)])
@@ -62,7 +62,7 @@ def through_portals(cells: Cells, obstacles: Obstacles, eye_height: float) -> Gr
     steps = steps[~obstacles.crossed(eye[steps[:, 0]], eye[steps[:, 1]])].astype(np.int64)
     cost = np.linalg.norm(eye[steps[:, 0]] - eye[steps[:, 1]], axis=1)
     cell = np.append(cells.leaf_cell, np.full(cells.portal_count, -1)).astype(np.int64)
-    return Ground.of(eye, cell, np.full(len(eye), ABOUT), steps, cost)
+    return WalkGround.of(eye, cell, np.full(len(eye), ABOUT), steps, cost)
 
 
 def _in_leaf(cells: Cells, leaf: int, eye_height: float) -> Floats:
@@ -133,7 +133,7 @@ def make_path(
     """
     random = np.random.default_rng(options.seed)
     eye_height = options.eye_height(cells.walker)
-    obstacles, eyes, standing = Obstacles(scene, cells), cells.eyes, cells.standing
+    obstacles, eyes, standing = WalkObstacles(scene, cells), cells.eyes, cells.standing
     if eyes.everywhere:
         ground = through_portals(cells, obstacles, eye_height)
     else:
@@ -146,7 +146,7 @@ def make_path(
             "there is no way for a walker",
             remedy="build the cells with a smaller --walker, or with --standing anywhere",
         )
-    views = Views(scene, ground, obstacles, random)
+    views = StopViews(scene, ground, obstacles, random)
     first = beginning(ground, viewpoints, options.seed)
     if first is None:
         first = Leg.at(int(random.choice([*middles.values()])))
@@ -198,11 +198,11 @@ def _sampled(
     motion: Motion, duration: float, options: PathOptions, cells: Cells, random: np.random.Generator
 ) -> Walk:
     """The walk, sampled at the rate of the options."""
-    each = math.ceil(_STEPS / options.rate)
+    substeps = math.ceil(_STEPS / options.rate)
     last = max(int(duration * options.rate), 1)
-    times = np.arange(last * each + 1) / (each * options.rate)
-    direction = directions(motion, times, random)[::each]
-    along, _ = motion.at(times[::each])
+    times = np.arange(last * substeps + 1) / (substeps * options.rate)
+    direction = directions(motion, times, random)[::substeps]
+    along, _ = motion.at(times[::substeps])
     eye = motion.way.position(along)
     # Points between two valid points of the way are nearly always valid; else the nearer one is
     # taken.
@@ -212,7 +212,7 @@ def _sampled(
     nearer = known[after] - along[outside] < along[outside] - known[after - 1]
     eye[outside] = motion.way.point[np.where(nearer, after, after - 1)]
     return Walk(
-        times[::each].round(DIGITS),
+        times[::substeps].round(DIGITS),
         eye.round(DIGITS) + 0.0,
         direction.round(DIGITS) + 0.0,
         options.field_of_view,

@@ -25,7 +25,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import EyeRegion
-from ptmtools_lab.path.ground import BODY, Obstacles
+from ptmtools_lab.path.ground import BODY, WalkObstacles
 
 #: m/s².
 ACCELERATION = 1.5
@@ -156,13 +156,13 @@ def _walked(since: Floats, length: Floats, speed: float) -> Floats:
     gain = top / ACCELERATION
     first = ACCELERATION * np.minimum(since, gain) ** 2 / 2
     steady = top * np.clip(since - gain, 0.0, np.maximum(time - 2 * gain, 0.0))
-    left = np.clip(time - since, 0.0, gain)
-    last = ACCELERATION * (gain**2 - left**2) / 2
+    remaining = np.clip(time - since, 0.0, gain)
+    last = ACCELERATION * (gain**2 - remaining**2) / 2
     return np.asarray(np.minimum(first + steady + last, length))
 
 
-def _angle(one: Floats, other: Floats) -> float:
-    return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+def _angle(a: Floats, b: Floats) -> float:
+    return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
 
 
 #: Radians a second around, and up and down; together less than 110°.
@@ -228,9 +228,9 @@ def _followed(aim: Floats, step: float, rate: float, gain: float) -> Floats:
     result = np.empty(len(aim))
     angle, turning = float(aim[0]), 0.0
     for row, wanted in enumerate(aim.tolist()):
-        left = math.remainder(wanted - angle, math.tau)
-        swift = min(rate, _CLOSING * abs(left), math.sqrt(gain * abs(left)))
-        change = math.copysign(swift, left) - turning
+        remaining = math.remainder(wanted - angle, math.tau)
+        swift = min(rate, _CLOSING * abs(remaining), math.sqrt(gain * abs(remaining)))
+        change = math.copysign(swift, remaining) - turning
         turning += max(-gain * step, min(gain * step, change))
         angle += turning * step
         result[row] = angle
@@ -245,7 +245,7 @@ class Smoother:
     """Smooths ways of eyes at one height above the floor, metres, with a body of one radius."""
 
     def __init__(
-        self, eyes: EyeRegion, obstacles: Obstacles, eye_height: float, radius: float
+        self, eyes: EyeRegion, obstacles: WalkObstacles, eye_height: float, radius: float
     ) -> None:
         self._eyes, self._obstacles, self._radius = eyes, obstacles, radius
         self._below = [np.array([0, (1 - height) * eye_height, 0]) for height in BODY]

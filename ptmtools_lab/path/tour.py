@@ -3,9 +3,9 @@
 A room with pictures worth a stop is visited there; another one in its middle, unless a way to
 another place leads through it.
 
-`Views` finds the stops: places that show much of an image, near and from the front. From places in
-each room rays are cast all around. A ray counts if its hit is at viewing distance and faces it; its
-weight is the bytes of the image's file for the covered part of its surface. So a painting of a
+`StopViews` finds the stops: places that show much of an image, near and from the front. From places
+in each room rays are cast all around. A ray counts if its hit is at viewing distance and faces it;
+its weight is the bytes of the image's file for the covered part of its surface. So a painting of a
 megabyte counts for more than plaster of a megabyte that covers all walls. No ray counts for more
 than a screen can show.
 
@@ -17,12 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, areas, normals
 from ptmtools.scene.model import Scene
-from ptmtools_lab.path.ground import Ground, Obstacles
+from ptmtools_lab.path.ground import WalkGround, WalkObstacles
 
 #: Viewing distances of a picture, metres, and least cosine of the angle to its normal.
 NEAR, FAR, FACED = 0.8, 3.0, 0.75
@@ -45,18 +46,22 @@ _STOPS = 3
 
 
 @dataclass(frozen=True)
-class Stop:
+class WalkStop:
     """A place on the ground to stop at, and the unit direction of view."""
 
     place: int
     direction: tuple[float, float, float]
 
 
-class Views:
+class StopViews:
     """The views of a building, and which parts of them a visitor has not yet viewed."""
 
     def __init__(
-        self, scene: Scene, ground: Ground, obstacles: Obstacles, random: np.random.Generator
+        self,
+        scene: Scene,
+        ground: WalkGround,
+        obstacles: WalkObstacles,
+        random: np.random.Generator,
     ) -> None:
         self._place = _candidates(ground, random)
         self._cell = ground.cell[self._place]
@@ -73,16 +78,16 @@ class Views:
         self._new = np.ones(self._boxes)
         self._best = float(self._shown().max(initial=0.0))
 
-    def round(self) -> dict[int, list[Stop]]:
+    def round(self) -> dict[int, list[WalkStop]]:
         """The stops of one round by cell: at pictures not yet viewed, or, once all were, at all of
         them again."""
         if self._shown().max(initial=0.0) < _LEAST * self._best:
             self._new[:] = 1.0
         return {int(cell): stops for cell in np.unique(self._cell) if (stops := self._in(cell))}
 
-    def _in(self, cell: int) -> list[Stop]:
+    def _in(self, cell: int) -> list[WalkStop]:
         rows = np.flatnonzero(self._cell == cell)
-        stops: list[Stop] = []
+        stops: list[WalkStop] = []
         least = _LEAST * self._best
         while len(stops) < _STOPS:
             shown = self._shown(rows)
@@ -94,7 +99,7 @@ class Views:
             box = self._box[place, window]
             weight = self._worth[place, window] * self._new[box]
             x, y, z = self._middle(self._eye[place], self._along[window], weight).tolist()
-            stops.append(Stop(int(self._place[place]), (x, y, z)))
+            stops.append(WalkStop(int(self._place[place]), (x, y, z)))
             self._new[box] = 0.0
         return stops
 
@@ -103,8 +108,8 @@ class Views:
         far, as in a door between two pictures, the direction of the nearest ray."""
         middle = (weight[..., None] * along).sum(axis=(0, 1))
         middle = middle / np.linalg.norm(middle)
-        _, far = self._obstacles.first(eye[None], middle[None], FAR)
-        if NEAR <= far[0] < FAR:
+        _, distance = self._obstacles.first(eye[None], middle[None], FAR)
+        if NEAR <= distance[0] < FAR:
             return np.asarray(middle)
         counted = along[weight > 0]
         return np.asarray(counted[(counted @ middle).argmax()])
@@ -115,7 +120,7 @@ class Views:
         return np.asarray(sum(np.roll(ray, k, axis=1) for k in range(-_BESIDE, _BESIDE + 1)))
 
 
-def _candidates(ground: Ground, random: np.random.Generator) -> Ints:
+def _candidates(ground: WalkGround, random: np.random.Generator) -> Ints:
     """Places of views: in each cell some of those with free space, evenly chosen."""
     spacious: Bools = ground.space >= _SPACE
     order = np.flatnonzero(spacious & (ground.cell >= 0))
@@ -131,27 +136,27 @@ def _candidates(ground: Ground, random: np.random.Generator) -> Ints:
 
 
 def _worth(
-    scene: Scene, obstacles: Obstacles, eye: Floats, along: Floats
+    scene: Scene, obstacles: WalkObstacles, eye: Floats, along: Floats
 ) -> tuple[Floats, Ints, int]:
     """(n,) the worth in bytes of each ray, from (n, 3) along (n, 3); (n,) the box of its hit; and
     the number of boxes."""
     image = np.array([material.image for material in scene.materials])[scene.triangle_material]
     corners = scene.corners
-    length = np.array([len(one.load()) for one in scene.images] + [0], dtype=np.float64)
+    length = np.array([len(image.load()) for image in scene.images] + [0], dtype=np.float64)
     size = areas(corners)
     shown = np.roll(np.bincount(image + 1, size, len(length)), -1)
     # No face shows a normal map alone.
     density = np.divide(length, shown, out=np.zeros(len(length)), where=shown > 0)
-    met, far = obstacles.first(eye, along, FAR)
+    met, distance = obstacles.first(eye, along, FAR)
     front = normals(corners[met])
     width = np.linalg.norm(front, axis=1)
     faced = np.abs(np.einsum("ij,ij->i", front, along))
     faced = np.divide(faced, width, out=np.zeros(len(met)), where=width > 0)
-    counts = (met >= 0) & (far >= NEAR) & (faced >= FACED)
+    counts = (met >= 0) & (distance >= NEAR) & (faced >= FACED)
     # The area covered by a ray, from its solid angle, which is the same for all.
-    bytes_seen = density[image[met]] * far**2 / np.maximum(faced, FACED)
+    bytes_seen = density[image[met]] * distance**2 / np.maximum(faced, FACED)
     worth = np.where(counts, np.minimum(bytes_seen, _PIXEL**-2), 0.0)
-    at = np.floor((eye + far[:, None] * along) / _BOX).astype(np.int64)
+    at = np.floor((eye + distance[:, None] * along) / _BOX).astype(np.int64)
     key = np.column_stack([image[met], at])
     key[~counts] = -1
     boxes, box = np.unique(key, axis=0, return_inverse=True)
@@ -183,7 +188,9 @@ class Leg:
         return Leg(np.array([place]), (), np.array(looks, dtype=np.float64).reshape(-1, 3))
 
 
-def tour(ground: Ground, middles: dict[int, int], views: Views, first: Leg) -> Iterator[list[Leg]]:
+def tour(
+    ground: WalkGround, middles: dict[int, int], views: StopViews, first: Leg
+) -> Iterator[list[Leg]]:
     """Endless rounds of legs; the ``first`` leg precedes them.
 
     Each round visits all cells that have ``middles``, see `middles_of`.
@@ -195,7 +202,7 @@ def tour(ground: Ground, middles: dict[int, int], views: Views, first: Leg) -> I
         before = []
 
 
-def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
+def middles_of(ground: WalkGround, standing: Bools) -> dict[int, int]:
     """A place in the middle of each (C,) ``standing`` cell that the ground reaches: of those with
     most free space the nearest to the mean of all."""
     result = {}
@@ -208,11 +215,11 @@ def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
 
 
 def _round(
-    ground: Ground, middles: dict[int, int], stops: dict[int, list[Stop]], at: int
+    ground: WalkGround, middles: dict[int, int], stops: dict[int, list[WalkStop]], at: int
 ) -> Iterator[Leg]:
     """One round, from the place ``at``."""
     looks: dict[int, list[tuple[float, ...]]] = {}
-    for stop in (one for several in stops.values() for one in several):
+    for stop in chain.from_iterable(stops.values()):
         looks.setdefault(stop.place, []).append(stop.direction)
     missing = {cell: place for cell, place in middles.items() if cell not in stops}
     goal = np.zeros(len(ground.eye), dtype=np.bool_)

@@ -1,6 +1,7 @@
 """The policies of clients as a table: the strategy of each.
 
-To add one, add a module with a `Client`, or a policy of the `engine`, and a line here.
+To add one, add a module with a `Client`, or a policy of the `engine`, and a line here, or an entry
+point of the group ``ptmtools.policies`` in another package (`ptmtools.plugins`).
 """
 
 from __future__ import annotations
@@ -11,16 +12,17 @@ from functools import partial
 
 import numpy as np
 
+from ptmtools import plugins
 from ptmtools.arrays import Ints
+from ptmtools.errors import MissingComponentError
 from ptmtools_lab.client import Client
 from ptmtools_lab.forms import PTM
-from ptmtools_lab.network import Link
+from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies import shares
 from ptmtools_lab.policies.apo import ApoClient
-from ptmtools_lab.policies.engine import EngineClient, Policy
-from ptmtools_lab.policies.oracle import Oracle
+from ptmtools_lab.policies.engine import EngineClient, Oracle, Policy
 from ptmtools_lab.policies.paper import PaperClient, PaperOptions
-from ptmtools_lab.policies.shares import BEST, Screen, Weighted
+from ptmtools_lab.policies.shares import BEST, ScreenPolicy, Weighted
 from ptmtools_lab.policies.whole_files import GpuiiClient, LruClient, WholeClient
 from ptmtools_lab.world import World
 
@@ -72,7 +74,7 @@ def _engine(policy: Policy, *, statistics: bool = False) -> Callable[..., Client
     return partial(EngineClient, policy=policy, statistics=statistics)
 
 
-def _oracle(world: World, link: Link, budget: int, *, exchanging: bool = False) -> Client:
+def _oracle(world: World, link: FluidLink, budget: int, *, exchanging: bool = False) -> Client:
     return EngineClient(world, link, budget, Oracle(world, exchanging=exchanging))
 
 
@@ -108,15 +110,21 @@ _LIST = (
     PolicyEntry(
         "bbox", "screen area of bounding boxes, without occlusion", _engine(Weighted(shares.by_box))
     ),
-    PolicyEntry("screen", "screen area of each texture, from an item buffer", _engine(Screen())),
-    PolicyEntry("screen+distance", "screen area and distance", _engine(Screen(shares.by_distance))),
     PolicyEntry(
-        "screen+ach", "screen area and average coverage hints", _engine(Screen(shares.by_coverage))
+        "screen", "screen area of each texture, from an item buffer", _engine(ScreenPolicy())
+    ),
+    PolicyEntry(
+        "screen+distance", "screen area and distance", _engine(ScreenPolicy(shares.by_distance))
+    ),
+    PolicyEntry(
+        "screen+ach",
+        "screen area and average coverage hints",
+        _engine(ScreenPolicy(shares.by_coverage)),
     ),
     PolicyEntry(
         "screen+need",
         "screen area and the resolution needed in the cell",
-        _engine(Screen(shares.by_need)),
+        _engine(ScreenPolicy(shares.by_need)),
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
     PolicyEntry(
@@ -141,7 +149,24 @@ _LIST = (
         previews=True,
     ),
 )
-#: Policies by name.
-POLICIES = {policy.name: policy for policy in _LIST}
 
-__all__ = ["POLICIES", "PolicyEntry"]
+
+def named_policies() -> dict[str, PolicyEntry]:
+    """The policies of ptmtools by name, then those of other packages.
+
+    Raises MissingComponentError: PTM-M110 as `plugins.declared`, or a name is taken.
+    """
+    table = {policy.name: policy for policy in _LIST}
+    for policy in plugins.declared("policies", PolicyEntry).values():
+        if table.setdefault(policy.name, policy) is not policy:
+            raise MissingComponentError(
+                "PTM-M110",
+                f"a plug-in declares the policy {policy.name!r}, which ptmtools has",
+                remedy="update or uninstall that package",
+            )
+    return table
+
+
+POLICIES = named_policies()
+
+__all__ = ["POLICIES", "PolicyEntry", "named_policies"]

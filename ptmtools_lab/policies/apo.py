@@ -20,7 +20,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.rendering.rays import NEAR
-from ptmtools_lab.network import Link
+from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies.engine import EngineClient
 from ptmtools_lab.policies.shares import BEST
 from ptmtools_lab.world import World
@@ -36,7 +36,7 @@ class ApoClient(EngineClient):
         (O,) levels that the screen needs; outside the frustum those it needed last.
     """
 
-    def __init__(self, world: World, link: Link, budget: int) -> None:
+    def __init__(self, world: World, link: FluidLink, budget: int) -> None:
         stock = world.catalogue
         count = world.relief.octrees.number if world.relief else 0
         # The last texture stands for errors that no download reduces.
@@ -56,9 +56,9 @@ class ApoClient(EngineClient):
         """See `Client.settle`."""
         self._see()
         self._target_levels, _ = self._filled(self.wanted)
-        held, self._all = self._filled(np.minimum(self.wanted, self.have[self.octrees]))
+        levels, self._all = self._filled(np.minimum(self.wanted, self.have[self.octrees]))
         super().settle()
-        self.column[self.octrees] = held
+        self.column[self.octrees] = levels
 
     def _fetch_one(self) -> bool:
         octree = self._next()
@@ -86,28 +86,29 @@ class ApoClient(EngineClient):
             return
         met = self.shapes_ahead(int(self.octrees[0]))
         number = shapes.texture[met] - self.octrees[0]
-        far = np.maximum(self.frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
-        np.minimum.at(self.distance, number, far)
+        distance = np.maximum(self.frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
+        np.minimum.at(self.distance, number, distance)
         nodes = np.zeros(len(self.octrees))
-        np.maximum.at(nodes, number, shapes.side[met, 0] / (far * self.world.camera.pixel))
+        np.maximum.at(nodes, number, shapes.side[met, 0] / (distance * self.world.camera.pixel))
         # Nodes of the last level are no larger than a pixel.
         levels = np.ceil(np.log2(np.maximum(nodes, 1.0))).astype(np.int64) + 1
         seen = np.isfinite(self.distance)
         self.wanted = np.where(seen, np.minimum(levels, stock.levels[self.octrees]), self.wanted)
         self._seen[seen] = self.frame
 
-    def _filled(self, most: Ints) -> tuple[Ints, int]:
-        """(O,) levels that fit, at most ``most``, the coarsest of all first; and the bytes left."""
+    def _filled(self, limit: Ints) -> tuple[Ints, int]:
+        """(O,) levels that fit, at most ``limit``, the coarsest of all first; and the bytes that
+        remain."""
         memory = self.world.catalogue.memory[self.octrees]
-        levels, left = np.zeros_like(most), self._total
+        levels, remaining = np.zeros_like(limit), self._total
         order = np.lexsort((self.distance, -self._seen)).tolist()
-        for k in range(int(most.max(initial=0))):
+        for k in range(int(limit.max(initial=0))):
             for o in order:
                 more = int(memory[o, k + 1] - memory[o, k])
-                if k < most[o] and levels[o] == k and more <= left:
+                if k < limit[o] and levels[o] == k and more <= remaining:
                     levels[o] = k + 1
-                    left -= more
-        return levels, left
+                    remaining -= more
+        return levels, remaining
 
     def _next(self) -> int | None:
         """The octree in the frustum to refine next."""
@@ -117,7 +118,11 @@ class ApoClient(EngineClient):
             if np.isfinite(self.distance[o])
         ]
         first = int(self.octrees[0]) if len(self.octrees) else 0
-        coarse = [each for each in candidates if each[0] < self._target_levels[each[2] - first]]
+        coarse = [
+            (levels, distance, octree)
+            for levels, distance, octree in candidates
+            if levels < self._target_levels[octree - first]
+        ]
         return min(coarse)[2] if coarse else None
 
     def _levels_asked(self, octree: int) -> int:

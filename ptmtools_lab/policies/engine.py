@@ -16,6 +16,10 @@ latency less of grey is worth 5 % of the error of 150 s at half a megabit a seco
 
 `ItemBuffers` gives the item buffer of a client: one that it drew some frames ago, or, in a browser,
 the last that could be read back by then. It shows the geometry that was loaded when it was drawn.
+
+`Oracle` is a policy that knows the walk: the worth of a level is the error that it will remove,
+discounted. It is greedy like the others: the same engine, with the true tables instead of an
+estimate. A lower bound by linear programming is separate (benchmarks/RESULTS.md).
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.site.client import (
     BEHIND,
     CONNECTIONS,
@@ -43,8 +47,8 @@ from ptmtools.site.client import (
     STREAMS,
 )
 from ptmtools_lab.allocation import allocate, gather, holes, next_fetch, offered
-from ptmtools_lab.client import Client, Kind
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.client import Client, FileKind
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.world import World
 
 
@@ -91,7 +95,7 @@ class ItemBuffers:
 
     def glance(self, frame: int) -> bool:
         """Passes a frame; returns whether it has another item buffer than the frame before."""
-        drawn, before = self._client.world.drawn, self._frame
+        drawn, before = self._client.world.track.drawn, self._frame
         self._frame = frame
         return drawn is not None and drawn[before] != drawn[frame]
 
@@ -99,18 +103,18 @@ class ItemBuffers:
         """The item buffer of ``age`` frames ago, or a browser's last, or None."""
         client, world = self._client, self._client.world
         stock = world.catalogue
-        if world.drawn is None:
+        if world.track.drawn is None:
             frame = max(0, client.frame - age)
             known, whole = stock.visible[client.cell], client.geometry.whole
             missing = known[~whole[known]]
-            return ItemBuffer(int(world.view[frame]), frame, self._loaded[frame], missing)
-        frame = int(world.drawn[self._frame])
+            return ItemBuffer(int(world.track.view[frame]), frame, self._loaded[frame], missing)
+        frame = int(world.track.drawn[self._frame])
         if frame < 0:
             return None
-        loaded = self._since <= world.time[frame]
-        entered = bisect_right(self._times, world.time[frame]) - 1
+        loaded = self._since <= world.track.time[frame]
+        entered = bisect_right(self._times, world.track.time[frame]) - 1
         known = stock.visible[self._cells[entered]] if entered >= 0 else np.zeros(0, np.int64)
-        return ItemBuffer(int(world.view[self._frame]), frame, loaded, known[~loaded[known]])
+        return ItemBuffer(int(world.track.view[self._frame]), frame, loaded, known[~loaded[known]])
 
 
 #: Requests at a time by protocol.
@@ -150,7 +154,13 @@ class EngineClient(Client):
     """A client with a policy, which may need the statistics."""
 
     def __init__(
-        self, world: World, link: Link, budget: int, policy: Policy, *, statistics: bool = False
+        self,
+        world: World,
+        link: FluidLink,
+        budget: int,
+        policy: Policy,
+        *,
+        statistics: bool = False,
     ) -> None:
         super().__init__(world, link, budget)
         self._policy, self._statistics = policy, statistics
@@ -187,12 +197,12 @@ class EngineClient(Client):
         share = np.zeros(stock.cell_count)
         item = self._items.available(age)
         if item and len(item.missing):
-            loaded = item.loaded if world.browser else self.geometry.whole
-            rays, _ = world.camera.rays(world.direction[item.frame : item.frame + 1])
+            loaded = item.loaded if world.track.browser else self.geometry.whole
+            rays, _ = world.camera.rays(world.track.direction[item.frame : item.frame + 1])
             holes(
                 rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[item.view],
-                world.views.depth[item.view], world.eye[item.frame], stock.low, stock.high, loaded,
-                item.missing, share,
+                world.views.depth[item.view], world.track.eye[item.frame], stock.low, stock.high,
+                loaded, item.missing, share,
             )  # fmt: skip
         return share
 
@@ -219,15 +229,15 @@ class EngineClient(Client):
 
     def settle(self) -> None:
         """See `Client.settle`."""
-        here = int(self.world.cell[self.frame])
-        if here != self._since:
-            self._reserve, self._since = 0, here
+        cell = int(self.world.track.cell[self.frame])
+        if cell != self._since:
+            self._reserve, self._since = 0, cell
         self.budget = self._all - self._reserve
         self._weigh()
         if self._worth is None:
             return
         hold, exact = self._worth.hold, self._worth.exact
-        now = float(self.world.time[self.frame])
+        now = float(self.world.track.time[self.frame])
         fading = 0.5 ** ((now - self._looked) / HELD_SECONDS)
         self._looked = now
         # The greatest share of late, whatever the sign of what it counts for.
@@ -240,7 +250,7 @@ class EngineClient(Client):
         offered(worth, self.have, stock.previews, self.previews.whole, step, source, last)
         last = np.where(self._suffices(), self.exact, last)
         allocate(step, stock.memory, last, self.budget, self.column, exact)
-        while self.world.browser and self._grow():
+        while self.world.track.browser and self._grow():
             self.budget = self._all - self._reserve
             allocate(step, stock.memory, last, self.budget, self.column, exact)
         self.source = source[np.arange(len(last)), self.column]
@@ -248,9 +258,9 @@ class EngineClient(Client):
     def arrived(self, request: Request) -> None:
         """See `Client.arrived`."""
         super().arrived(request)
-        if request.tag.kind not in (Kind.TEXTURE, Kind.PREVIEW):  # type: ignore[attr-defined]
-            if self.cell < 0 and self.records.whole[self.world.cell[self.frame]]:
-                self.cell = int(self.world.cell[self.frame])
+        if request.tag.kind not in (FileKind.TEXTURE, FileKind.PREVIEW):  # type: ignore[attr-defined]
+            if self.cell < 0 and self.records.whole[self.world.track.cell[self.frame]]:
+                self.cell = int(self.world.track.cell[self.frame])
             self._items.note()
             self._weigh()
 
@@ -276,7 +286,7 @@ class EngineClient(Client):
         return grown
 
     def _weigh(self) -> None:
-        if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):
+        if self.cell >= 0 and (self.files[FileKind.STATISTICS].whole[0] or not self._statistics):
             stock = self.world.catalogue
             self._worth = self._policy(self)
             fetch, exact = self._worth.fetch[: stock.texture_count], self._worth.exact
@@ -291,22 +301,22 @@ class EngineClient(Client):
         """Whether the link would run dry before a later request could be answered."""
         if len(self.waiting) >= self._concurrency:
             return False
-        left = sum(request.outstanding for request in self.waiting)
+        outstanding = sum(request.outstanding for request in self.waiting)
         ahead = self.estimate.latency + RANGE_SECONDS / 2
-        return left == 0 or 8 * left < ahead * self.estimate.bandwidth
+        return outstanding == 0 or 8 * outstanding < ahead * self.estimate.bandwidth
 
     def _fetch_one(self) -> bool:
         """Requests the range of the greatest worth; False if there is none."""
-        if not self.files[Kind.INDEX].asked[0]:
+        if not self.files[FileKind.INDEX].asked[0]:
             self.open()
         if not self.index:
             return False
-        if self._statistics and self.whole(Kind.STATISTICS, 0, math.inf):
+        if self._statistics and self.whole(FileKind.STATISTICS, 0, math.inf):
             return True
-        here = int(self.world.cell[self.frame])
-        if self.whole(Kind.RECORD, here, math.inf):
+        current = int(self.world.track.cell[self.frame])
+        if self.whole(FileKind.RECORD, current, math.inf):
             return True
-        if self.cell < 0 and self.whole(Kind.GEOMETRY, here, math.inf):
+        if self.cell < 0 and self.whole(FileKind.GEOMETRY, current, math.inf):
             return True
         if self._worth is None:
             return False
@@ -323,17 +333,17 @@ class EngineClient(Client):
             least = min(records, key=lambda c: int(self.records.size[c]))
             record = NOTHING * RECORD_SHARE / float(self.records.size[least])
             if record > max(best, float(density[cell]), finer):
-                return self.whole(Kind.RECORD, least, record)
+                return self.whole(FileKind.RECORD, least, record)
         if finer > max(best, float(density[cell])):
-            return self.whole(Kind.MESH, mesh, finer)
+            return self.whole(FileKind.MESH, mesh, finer)
         if density[cell] > best:
-            return self.whole(Kind.GEOMETRY, cell, float(density[cell]))
+            return self.whole(FileKind.GEOMETRY, cell, float(density[cell]))
         if source < 0 and worth.ahead is not None:
             best, source, column = self._next_fetch(worth.ahead, stock.levels)
         if source < 0:
             return False
         if source >= stock.texture_count:
-            return self.whole(Kind.PREVIEW, source - stock.texture_count, best)
+            return self.whole(FileKind.PREVIEW, source - stock.texture_count, best)
         return self._range(source, int(stock.ends[source, column]), best)
 
     def _next_mesh(self) -> tuple[int, float]:
@@ -367,9 +377,71 @@ class EngineClient(Client):
         return OVERHEAD + int(min(waiting, LONGEST_WAIT))
 
     def _range(self, texture: int, end: int, priority: float) -> bool:
-        most = max(RANGE_BYTES, RANGE_SECONDS * self.estimate.bandwidth / 8)
+        limit = max(RANGE_BYTES, RANGE_SECONDS * self.estimate.bandwidth / 8)
         asked = int(self.textures.asked[texture])
-        if end - asked > most:
-            end = asked + int(most)
-        self.ask(Kind.TEXTURE, texture, end, priority)
+        if end - asked > limit:
+            end = asked + int(limit)
+        self.ask(FileKind.TEXTURE, texture, end, priority)
         return True
+
+
+#: Seconds after which errors count 1/e, in the near and the far future, and the weight of the
+#: latter.
+SOON, LATER = 3.0, 60.0
+_LATER_SHARE, _SOON_HELD = 0.003, 1e-4
+
+
+class Oracle:
+    """A policy for one walk; with ``exchanging`` it exchanges steps, see
+    `ptmtools_lab.allocation.exchange`."""
+
+    def __init__(self, world: World, *, exchanging: bool = False) -> None:
+        self._exchanging = exchanging
+        self._now, self._cells = _drops(world)
+        self._soon = [
+            _discounted(table, SOON * world.track.rate) for table in (self._now, self._cells)
+        ]
+        self._later = [_discounted(t, LATER * world.track.rate) for t in (self._now, self._cells)]
+
+    def __call__(self, client: EngineClient) -> Worth:
+        """See `Policy`."""
+        f = client.frame
+        soon, later = (tables[0][f].astype(np.float64) for tables in (self._soon, self._later))
+        cells = self._soon[1][f] + _LATER_SHARE * self._later[1][f]
+        return Worth(
+            hold=self._now[f] + _SOON_HELD * soon,
+            fetch=soon + _LATER_SHARE * later,
+            geometry=cells.astype(np.float64),
+            ahead=later,
+            exact=self._exchanging,
+        )
+
+
+def _drops(world: World) -> tuple[Singles, Singles]:
+    """(F, R, K) the reduction of each frame's error by each column of each source, and (F, C) the
+    error without each cell's geometry."""
+    stock, views = world.catalogue, world.views
+    count, textures, previews = views.frames, stock.texture_count, stock.previews
+    columns = np.zeros((count, *stock.gains.shape), np.float32)
+    cells = np.zeros((count, stock.cell_count), np.float32)
+    frame = np.repeat(np.arange(count), np.diff(views.start))
+    np.add.at(cells, (frame, views.cell), views.error[:, 0])
+    texture_of = np.concatenate([np.arange(textures), previews.texture])
+    first = np.concatenate([np.zeros(textures, np.int64), previews.state])
+    last = np.concatenate([stock.levels, previews.column])
+    for row, (t, before, until) in enumerate(zip(texture_of, first, last, strict=True)):
+        shown = np.flatnonzero(views.texture == t)
+        error = views.error[shown, before + 1 : before + until + 2]
+        error[:, 0] = views.error[shown, 1]
+        np.add.at(columns[:, row, 1 : until + 1], frame[shown], error[:, :-1] - error[:, 1:])
+    return columns[world.track.view], cells[world.track.view]
+
+
+def _discounted(table: Singles, frames: float) -> Singles:
+    """Discounted sums over future frames; each frame counts less than the one before."""
+    result, kept = np.empty_like(table), np.exp(-1 / frames)
+    total = np.zeros_like(table[0])
+    for f in range(len(table) - 1, -1, -1):
+        total = total * kept + table[f]
+        result[f] = total
+    return result

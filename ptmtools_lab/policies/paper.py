@@ -34,13 +34,102 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError
+from ptmtools.jit import kernel, plain_kernel
 from ptmtools.options import option
 from ptmtools.quantities import MemorySize, parse_memory
 from ptmtools.site.client import AHEAD, BEFORE
-from ptmtools_lab.client import Client, Kind, Range
-from ptmtools_lab.network import Link
-from ptmtools_lab.policies.paper_kernels import refresh, share_out
-from ptmtools_lab.world import STILL_SECONDS, World
+from ptmtools_lab.client import Client, FileKind, Range
+from ptmtools_lab.network import FluidLink
+from ptmtools_lab.track import STILL_SECONDS
+from ptmtools_lab.world import World
+
+
+@plain_kernel
+def share_out(
+    cells: Ints,
+    weight: Floats,
+    first_shape: Ints,
+    texture: Ints,
+    shown: Bools,
+    memory: Ints,
+    levels: Ints,
+    column: Ints,
+    budget: float,
+    share: Floats,
+) -> None:
+    """Adds to ``share`` (T,) the bytes that each texture keeps.
+
+    Parameters
+    ----------
+    cells, weight: (n,) cells in the frustum by descending hint, and their hints.
+    first_shape, texture, shown: (C + 1,), (S,), (S,) shapes of cells, their textures, and whether
+        they are textured and in the frustum.
+    memory, levels, column: (T, K), (T,), (T,): column 0 is nothing.
+    """
+    remaining, total = budget, weight.sum()
+    for i in range(len(cells)):
+        begin, end = first_shape[cells[i]], first_shape[cells[i] + 1]
+        part = remaining * weight[i] / total if total > 0.0 else 0.0
+        total -= weight[i]
+        waiting = 0
+        for s in range(begin, end):
+            waiting += shown[s]
+        rest = part
+        for s in range(begin, end):
+            if not shown[s]:
+                continue
+            offer = rest / waiting
+            waiting -= 1
+            t = texture[s]
+            wanted = float(memory[t, min(column[t] + 1, levels[t])])
+            if wanted > share[t] + offer:
+                share[t] += offer
+                rest -= offer
+            else:
+                rest -= max(0.0, wanted - share[t])
+                share[t] = max(share[t], wanted)
+        remaining -= part - rest
+
+
+@kernel
+def refresh(
+    share: Floats,
+    memory: Ints,
+    levels: Ints,
+    have: Ints,
+    pending: Bools,
+    budget: int,
+    column: Ints,
+) -> Ints:
+    """Removes and adds a level of each texture, by its kept and downloaded bytes; returns the
+    textures whose next level is to be requested. ``column`` (T,) changes.
+
+    Further levels are removed while all together exceed the budget, as when it has shrunk.
+    """
+    asks = np.zeros(len(share), np.int64)
+    count, used, removed = 0, budget + 1, True
+    before = column.copy()
+    while removed and used > budget:
+        used, removed = 0, False
+        for t in range(len(share)):
+            if column[t] > 0 and memory[t, column[t]] > share[t]:
+                column[t] -= 1
+                removed = True
+            used += memory[t, column[t]]
+    for t in range(len(share)):
+        current = column[t]
+        if current < before[t] or current >= levels[t] or memory[t, current + 1] > share[t]:
+            continue
+        if current + 1 <= have[t]:
+            more = memory[t, current + 1] - memory[t, current]
+            if used + more <= budget:
+                used += more
+                column[t] = current + 1
+        elif not pending[t]:
+            asks[count] = t
+            count += 1
+    return asks[:count]
+
 
 #: Rendered frames per second.
 FRAMES = 30
@@ -96,19 +185,19 @@ class PaperOptions:
         if self.memory:
             static_memory, whole = self.memory.of(world.catalogue.whole), world.catalogue.whole
             static = whole if static_memory is None else static_memory
-        return np.where(world.still_after(self.static_after), static, budget)
+        return np.where(world.track.still_after(self.static_after), static, budget)
 
 
 class PaperClient(Client):
     """The client of the module."""
 
     def __init__(
-        self, world: World, link: Link, budget: int, options: PaperOptions = PaperOptions()
+        self, world: World, link: FluidLink, budget: int, options: PaperOptions = PaperOptions()
     ) -> None:
         super().__init__(world, link, budget)
-        self.ticks = max(1, round(FRAMES / world.rate))
+        self.ticks = max(1, round(FRAMES / world.track.rate))
         self._options = options
-        self._static = world.still_after(options.static_after)
+        self._static = world.track.still_after(options.static_after)
         self._limits = options.limits(world, budget)
         stock = world.catalogue
         self._pending = np.zeros(stock.texture_count, dtype=bool)
@@ -144,41 +233,41 @@ class PaperClient(Client):
         )  # fmt: skip
         have = self.have
         asks = refresh(share, stock.memory, stock.levels, have, self._pending, budget, self.column)
-        most = self._options.delta_t_static if static else self._options.delta_t
+        limit = self._options.delta_t_static if static else self._options.delta_t
         for t in asks.tolist():
             end = int(stock.ends[t, have[t] + 1])
             size = end - int(self.textures.asked[t])
-            if self._used[t] and self.estimate.duration(size) <= most:
+            if self._used[t] and self.estimate.duration(size) <= limit:
                 self._pending[t] = True
-                self.ask(Kind.TEXTURE, t, end, LEVEL)
+                self.ask(FileKind.TEXTURE, t, end, LEVEL)
 
     def fetch(self) -> None:
         """See `Client.fetch`: documents and geometry; `tick` requests levels."""
-        if not self.files[Kind.INDEX].asked[0]:
-            self._request(Kind.INDEX, 0, CURRENT)
+        if not self.files[FileKind.INDEX].asked[0]:
+            self._request(FileKind.INDEX, 0, CURRENT)
         if not self.index:
             return
-        here = int(self.world.cell[self.frame])
-        self._request(Kind.RECORD, here, CURRENT)
-        self._request(Kind.GEOMETRY, here, CURRENT)
+        current = int(self.world.track.cell[self.frame])
+        self._request(FileKind.RECORD, current, CURRENT)
+        self._request(FileKind.GEOMETRY, current, CURRENT)
         if self.cell < 0:
             return
-        for other in self.known().tolist():
-            self._request(Kind.GEOMETRY, other, VISIBLE)
+        for cell in self.known().tolist():
+            self._request(FileKind.GEOMETRY, cell, VISIBLE)
         # The paper has no levels of detail: the objects as modelled follow the cells.
         known = self.known()
         for mesh in self.modelled(known[self.geometry.whole[known]]):
-            self._request(Kind.MESH, mesh, VISIBLE)
+            self._request(FileKind.MESH, mesh, VISIBLE)
         following = self._next()
         if following >= 0:
-            self._request(Kind.RECORD, following, NEXT)
-            self._request(Kind.GEOMETRY, following, NEXT)
+            self._request(FileKind.RECORD, following, NEXT)
+            self._request(FileKind.GEOMETRY, following, NEXT)
 
     def arrived(self, request: object) -> None:
         """See `Client.arrived`."""
         super().arrived(request)  # type: ignore[arg-type]
         part = request.tag  # type: ignore[attr-defined]
-        if part.kind == Kind.TEXTURE:
+        if part.kind == FileKind.TEXTURE:
             self._pending[part.number] = False
 
     def settle(self) -> None:
@@ -188,7 +277,7 @@ class PaperClient(Client):
         """The visible set of the cell in use."""
         return self.world.catalogue.visible[self.cell]
 
-    def _request(self, kind: Kind, number: int, priority: float) -> None:
+    def _request(self, kind: FileKind, number: int, priority: float) -> None:
         """Requests a file, or raises the priority of its request."""
         files = self.files[kind]
         if not self.whole(kind, number, priority) and not files.whole[number]:
@@ -220,16 +309,17 @@ class PaperClient(Client):
     def _next(self) -> int:
         """The cell behind the first portal that the recent motion will soon reach, or -1."""
         world, f = self.world, self.frame
-        before = max(0, f - round(BEFORE * world.rate))
-        way = world.eye[f] - world.eye[before]
+        before = max(0, f - round(BEFORE * world.track.rate))
+        way = world.track.eye[f] - world.track.eye[before]
         if f == before or not way.any():
             return -1
-        way = way * (AHEAD / float(world.time[f] - world.time[before]))
+        way = way * (AHEAD / float(world.track.time[f] - world.track.time[before]))
         result, nearest = -1, np.inf
         for portal in world.catalogue.records[self.cell]["portals"]:
-            far = _crossing(world.eye[f], way, np.array(portal["polygon"], dtype=np.float64))
-            if far < nearest:
-                result, nearest = int(portal["neighbour"]), far
+            polygon = np.array(portal["polygon"], dtype=np.float64)
+            distance = _crossing(world.track.eye[f], way, polygon)
+            if distance < nearest:
+                result, nearest = int(portal["neighbour"]), distance
         return result
 
 

@@ -13,15 +13,16 @@ them.
 and 1.62. Also tried: the joint difference of the missing levels, so that a coarse one under a
 missing fine one counts little: no better.)
 
-`Screen` uses an item buffer of the view (`screen` and its variants). It has half as many pixels
-each way as the one that errors are summed over (80 × 45). It gives the texture of each pixel and
-the level it wants, or the cell of a placeholder; ``age`` is its age in frames. Surroundings, by
+`ScreenPolicy` uses an item buffer of the view (`screen` and its variants). It has half as many
+pixels each way as the one that errors are summed over (80 × 45). It gives the texture of each pixel
+and the level it wants, or the cell of a placeholder; ``age`` is its age in frames. Surroundings, by
 distance, coverage or need, count a fifth: any weight from a twentieth to one does about as well.
 
-`BEST` is the policy of the viewer (docs/formats/client.md): `Screen` with surroundings by distance
-and by need, half and half. Distance is right about surfaces that one may approach, need about the
-resolution of those seen from standing positions; together they take 3 % off either alone at half a
-megabit a second (benchmarks/RESULTS.md). Without need in the records it uses distance alone.
+`BEST` is the policy of the viewer (docs/formats/client.md): `ScreenPolicy` with surroundings by
+distance and by need, half and half. Distance is right about surfaces that one may approach, need
+about the resolution of those seen from standing positions; together they take 3 % off either alone
+at half a megabit a second (benchmarks/RESULTS.md). Without need in the records it uses distance
+alone.
 """
 
 from __future__ import annotations
@@ -72,8 +73,8 @@ def by_coverage(client: EngineClient) -> Floats:
     listed in the record of the current cell."""
     stock = client.world.catalogue
     share = np.zeros(stock.texture_count)
-    own = stock.records[client.cell]["textures"]
-    for covers, textures in zip(client.coverage().tolist(), own, strict=True):
+    rows = stock.records[client.cell]["textures"]
+    for covers, textures in zip(client.coverage().tolist(), rows, strict=True):
         share[textures] += covers / max(len(textures), 1)
     return every_level(client, share)
 
@@ -81,10 +82,10 @@ def by_coverage(client: EngineClient) -> Floats:
 def by_distance(client: EngineClient) -> Floats:
     """(T, K) shares by the inverse square of the distance of the nearest shape; they sum to 1."""
     stock = client.world.catalogue
-    shapes, here = stock.shapes, client.loaded_shapes()
-    far = client.frustum.distance(shapes.low[here], shapes.high[here])
+    shapes, loaded = stock.shapes, client.loaded_shapes()
+    distance = client.frustum.distance(shapes.low[loaded], shapes.high[loaded])
     share = np.zeros(stock.texture_count)
-    np.maximum.at(share, shapes.texture[here], 1 / np.maximum(far, NEAREST) ** 2)
+    np.maximum.at(share, shapes.texture[loaded], 1 / np.maximum(distance, NEAREST) ** 2)
     return every_level(client, share / max(float(share.sum()), 1e-12))
 
 
@@ -124,9 +125,9 @@ class Weighted:
 def distance_shares(client: EngineClient, shapes: Ints) -> Floats:
     """The inverse square of the distance of the nearest shape."""
     stock = client.world.catalogue
-    far = client.frustum.distance(stock.shapes.low[shapes], stock.shapes.high[shapes])
+    distance = client.frustum.distance(stock.shapes.low[shapes], stock.shapes.high[shapes])
     weights = np.zeros(stock.texture_count)
-    np.maximum.at(weights, stock.shapes.texture[shapes], 1 / np.maximum(far, NEAREST) ** 2)
+    np.maximum.at(weights, stock.shapes.texture[shapes], 1 / np.maximum(distance, NEAREST) ** 2)
     return weights
 
 
@@ -178,8 +179,8 @@ def _split(client: EngineClient, shapes: Ints, coverage: Floats) -> Floats:
     of_cell[client.known()] = coverage
     count = np.bincount(stock.shapes.cell[shapes], minlength=stock.cell_count)
     of_cell *= count > 0
-    each = of_cell / max(float(of_cell.sum()), 1e-12) / np.maximum(count, 1)
-    return _summed(stock, shapes, each[stock.shapes.cell[shapes]])
+    shape_share = of_cell / max(float(of_cell.sum()), 1e-12) / np.maximum(count, 1)
+    return _summed(stock, shapes, shape_share[stock.shapes.cell[shapes]])
 
 
 def _summed(stock: Catalogue, shapes: Ints, of_shape: Floats) -> Floats:
@@ -194,7 +195,7 @@ AROUND = 0.2
 
 
 @dataclass(frozen=True)
-class Screen:
+class ScreenPolicy:
     """A policy by an item buffer.
 
     Attributes
@@ -232,4 +233,4 @@ def by_both(client: EngineClient) -> Floats:
     return (near + by_need(client)) / 2
 
 
-BEST = Screen(by_both, SURROUNDINGS)
+BEST = ScreenPolicy(by_both, SURROUNDINGS)

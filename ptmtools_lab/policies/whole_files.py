@@ -37,15 +37,15 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.rendering.rays import NEAR
 from ptmtools.site.client import CONNECTIONS
-from ptmtools_lab.client import Client, Kind
-from ptmtools_lab.network import Link
+from ptmtools_lab.client import Client, FileKind
+from ptmtools_lab.network import FluidLink
 from ptmtools_lab.world import World
 
 
 class WholeFileClient(Client, ABC):
     """A client that requests whole files, after all earlier requests."""
 
-    def __init__(self, world: World, link: Link, budget: int) -> None:
+    def __init__(self, world: World, link: FluidLink, budget: int) -> None:
         super().__init__(world, link, budget)
         #: The frame in which each texture was seen last, -1 for none.
         self._seen = np.full(world.catalogue.texture_count, -1, np.int64)
@@ -53,38 +53,38 @@ class WholeFileClient(Client, ABC):
     def documents(self) -> bool:
         """Requests the index, then the record of the cell and the geometry of its visible set;
         returns whether the index has arrived."""
-        self.request(Kind.INDEX, 0)
+        self.request(FileKind.INDEX, 0)
         if not self.index:
             return False
-        self.request(Kind.RECORD, int(self.world.cell[self.frame]))
+        self.request(FileKind.RECORD, int(self.world.track.cell[self.frame]))
         if self.cell >= 0:
             for cell in self.world.catalogue.visible[self.cell].tolist():
-                self.request(Kind.GEOMETRY, cell)
+                self.request(FileKind.GEOMETRY, cell)
             for mesh in self.modelled(self.world.catalogue.visible[self.cell]):
-                self.request(Kind.MESH, mesh)
+                self.request(FileKind.MESH, mesh)
         return True
 
-    def request(self, kind: Kind, number: int) -> None:
+    def request(self, kind: FileKind, number: int) -> None:
         """Requests a file unless it was requested."""
         self.whole(kind, number, -self.link.requests)
 
-    def keep(self, order: Ints, left: int) -> None:
-        """Adds the finest levels that fit into ``left`` bytes, of the textures in this order, up to
-        the first that was never seen."""
+    def keep(self, order: Ints, remaining: int) -> None:
+        """Adds the finest levels that fit into ``remaining`` bytes, of the textures in this order,
+        up to the first that was never seen."""
         memory, have = self.world.catalogue.memory, self.have
         for t in order.tolist():
             if self._seen[t] < 0:
                 break
-            held = int(memory[t, self.column[t]])
-            fits = int((memory[t, : have[t] + 1] <= held + left).sum()) - 1
+            resident = int(memory[t, self.column[t]])
+            fits = int((memory[t, : have[t] + 1] <= resident + remaining).sum()) - 1
             self.column[t] = max(fits, int(self.column[t]))
-            left -= int(memory[t, self.column[t]]) - held
+            remaining -= int(memory[t, self.column[t]]) - resident
 
 
 class LruClient(WholeFileClient):
     """The client `lru` of the module."""
 
-    def __init__(self, world: World, link: Link, budget: int) -> None:
+    def __init__(self, world: World, link: FluidLink, budget: int) -> None:
         super().__init__(world, link, budget)
         self._queue: list[int] = []
 
@@ -108,13 +108,13 @@ class LruClient(WholeFileClient):
         if not self.documents():
             return
         while self._queue and len(self.waiting) < CONNECTIONS:
-            self.request(Kind.TEXTURE, self._queue.pop(0))
+            self.request(FileKind.TEXTURE, self._queue.pop(0))
 
 
 class WholeClient(WholeFileClient):
     """The client `whole` of the module."""
 
-    def __init__(self, world: World, link: Link, budget: int) -> None:
+    def __init__(self, world: World, link: FluidLink, budget: int) -> None:
         super().__init__(world, link, budget)
         stock = world.catalogue
         self._size = stock.memory[np.arange(stock.texture_count), stock.stored]
@@ -136,8 +136,8 @@ class WholeClient(WholeFileClient):
                 self._shrink(self.budget - int(self._size[t]))
                 self._held[t] = None
         self.column[:] = 0
-        held = [*self._held]
-        self.column[held] = stock.stored[held]
+        resident = [*self._held]
+        self.column[resident] = stock.stored[resident]
 
     def fetch(self) -> None:
         """See `Client.fetch`: one after the other, whole."""
@@ -146,7 +146,7 @@ class WholeClient(WholeFileClient):
         for t in self._order:
             if len(self.waiting) >= CONNECTIONS:
                 break
-            self.request(Kind.TEXTURE, t)
+            self.request(FileKind.TEXTURE, t)
 
     def modelled(self, cells: Ints) -> list[int]:
         """See `Client.modelled`: after the geometry of their cells."""
@@ -175,7 +175,7 @@ class GpuiiClient(WholeFileClient):
         one. wanted: (T,) columns that the screen needs.
     """
 
-    def __init__(self, world: World, link: Link, budget: int, ring: float = RING) -> None:
+    def __init__(self, world: World, link: FluidLink, budget: int, ring: float = RING) -> None:
         super().__init__(world, link, budget)
         count = world.catalogue.texture_count
         self._ring = ring
@@ -195,8 +195,8 @@ class GpuiiClient(WholeFileClient):
 
     def settle(self) -> None:
         """See `Client.settle`."""
-        self.column, left = self._filled(np.minimum(self.wanted, self.have))
-        self.keep(np.lexsort((self.distance, -self._seen)), left)
+        self.column, remaining = self._filled(np.minimum(self.wanted, self.have))
+        self.keep(np.lexsort((self.distance, -self._seen)), remaining)
 
     def fetch(self) -> None:
         """See `Client.fetch`."""
@@ -209,18 +209,18 @@ class GpuiiClient(WholeFileClient):
             end = int(stock.ends[t, step])
             busy = self.world.one_range and asked[t] > self.textures.loaded[t]
             if step <= self._target[t] and asked[t] < end and not busy:
-                self.ask(Kind.TEXTURE, t, end, -self.link.requests)
+                self.ask(FileKind.TEXTURE, t, end, -self.link.requests)
 
     def _see(self) -> None:
         """Updates the visible textures, their distances, and the columns that the screen needs."""
         stock, shapes = self.world.catalogue, self.world.catalogue.shapes
         frustum, met = self.world.frustum(self.frame), self.shapes_ahead()
         texture = shapes.texture[met]
-        far = np.maximum(frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
+        distance = np.maximum(frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
         self.distance = np.full(stock.texture_count, np.inf)
-        np.minimum.at(self.distance, texture, far)
+        np.minimum.at(self.distance, texture, distance)
         pixels = np.zeros((stock.texture_count, 2))
-        pixel = far[:, None] * self.world.camera.pixel
+        pixel = distance[:, None] * self.world.camera.pixel
         np.maximum.at(pixels, texture, shapes.side[met] / pixel)
         coarse = (stock.size[:, 1:] < pixels[:, None]).any(axis=2).sum(axis=1)
         visible = np.isfinite(self.distance)
@@ -231,17 +231,17 @@ class GpuiiClient(WholeFileClient):
         texture = np.repeat(np.arange(len(self.wanted)), self.wanted)
         first = np.cumsum(self.wanted) - self.wanted
         step = np.arange(len(texture)) - first[texture] + 1
-        far = self.distance[texture]
-        order = np.lexsort((texture, far, step, far // self._ring))
+        distance = self.distance[texture]
+        order = np.lexsort((texture, distance, step, distance // self._ring))
         return list(zip(texture[order].tolist(), step[order].tolist(), strict=True))
 
-    def _filled(self, most: Ints) -> tuple[Ints, int]:
-        """(T,) columns that fit, at most ``most``, by the order of steps; and the bytes left."""
+    def _filled(self, limit: Ints) -> tuple[Ints, int]:
+        """(T,) columns that fit, at most ``limit``, by the order of steps; and the bytes left."""
         memory = self.world.catalogue.memory
-        column, left = np.zeros_like(most), self.budget
+        column, remaining = np.zeros_like(limit), self.budget
         for t, step in self._steps:
             more = int(memory[t, step] - memory[t, step - 1])
-            if step <= most[t] and column[t] == step - 1 and more <= left:
+            if step <= limit[t] and column[t] == step - 1 and more <= remaining:
                 column[t] = step
-                left -= more
-        return column, left
+                remaining -= more
+        return column, remaining

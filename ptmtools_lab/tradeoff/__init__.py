@@ -26,7 +26,7 @@ EXPERIMENTS: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
 #: textures, interlaced images and campuses.
 FURTHER: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
     LIGHT.name: Lazy("ptmtools_lab.tradeoff.light:prepare_lightmaps"),
-    "client": Lazy("ptmtools_lab.tradeoff.visitor:prepare_client"),
+    "client": Lazy("ptmtools_lab.tradeoff.stages:prepare_client"),
     "apo": Lazy("ptmtools_lab.tradeoff.forms:prepare_octree"),
     "interlace": Lazy("ptmtools_lab.tradeoff.forms:prepare_interlaced"),
     "campus-meshes": Lazy("ptmtools_lab.tradeoff.forms:prepare_coarse"),

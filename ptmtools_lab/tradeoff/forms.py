@@ -12,13 +12,15 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, areas
+from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.embree import ray_tree
 from ptmtools.executor import Executor
 from ptmtools.light.looks import RayLight as Light
 from ptmtools.light.occlusion import Occluders, points_on
@@ -35,7 +37,6 @@ from ptmtools_lab.tradeoff.experiment import (
     decibels,
     timed,
 )
-from ptmtools_lab.tradeoff.looks import Rays, apart, look, outline
 from ptmtools_systems.apo.files import glb_of, streamed
 from ptmtools_systems.apo.making import distinct, make_apo, welded
 from ptmtools_systems.apo.model import ApoOptions
@@ -51,6 +52,92 @@ from ptmtools_systems.interlace.writing import interlace
 
 if TYPE_CHECKING:
     from PIL import Image
+
+#: Directions of view, and rays along each side of a view.
+DIRECTIONS, SIDE = 24, 96
+_GOLDEN = np.pi * (3 - np.sqrt(5))
+
+
+@dataclass(frozen=True)
+class ViewerRays:
+    """Parallel rays around a box, all within its sphere.
+
+    Attributes
+    ----------
+    start, along: (n, 3) origins, and unit directions.
+    middle: (3,) subtracted before anything goes to float32. far: length of the rays.
+    """
+
+    start: Floats
+    along: Floats
+    middle: Floats
+    far: float
+
+    @staticmethod
+    def around(points: Floats) -> ViewerRays:
+        """ViewerRays at the box of (n, 3) points from all sides."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+        k = np.arange(DIRECTIONS) + 0.5
+        height, turn = 1 - 2 * k / DIRECTIONS, _GOLDEN * k
+        flat = np.sqrt(1 - height**2)
+        ahead = np.stack([flat * np.cos(turn), height, flat * np.sin(turn)], axis=1)
+        right = np.cross(ahead, np.eye(3)[np.abs(ahead).argmin(axis=1)])
+        right /= np.linalg.norm(right, axis=1, keepdims=True)
+        up = np.cross(right, ahead)
+        place = ((np.arange(SIDE) + 0.5) / SIDE * 2 - 1) * radius
+        x, y = (axis_places.ravel()[:, None] for axis_places in np.meshgrid(place, place))
+        inside = (x**2 + y**2 < radius**2).ravel()
+        start = [
+            (x * r + y * u - radius * a)[inside] for a, r, u in zip(ahead, right, up, strict=True)
+        ]
+        along = np.repeat(ahead, int(inside.sum()), axis=0)
+        return ViewerRays(middle + np.concatenate(start), along, middle, 2 * radius)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What rays meet.
+
+    Attributes
+    ----------
+    triangle: (n,) of the mesh, -1 for none. weight: (n, 3) of its corners.
+    distance: (n,) along the rays.
+    """
+
+    triangle: Ints
+    weight: Floats
+    distance: Floats
+
+    @cached_property
+    def met(self) -> Bools:
+        """(n,) whether a ray meets the mesh."""
+        return self.triangle >= 0
+
+
+def look(rays: ViewerRays, points: Floats, triangles: NDArray[np.int32]) -> Seen:
+    """The first hits of rays on (T, 3) triangles between (P, 3) points."""
+    tree = ray_tree(points - rays.middle, triangles)
+    origin = np.ascontiguousarray(rays.start - rays.middle, dtype=np.float32)
+    hits = tree.run(origin, rays.along.astype(np.float32), output=True)
+    u, v = hits["u"].astype(np.float64), hits["v"].astype(np.float64)
+    return Seen(
+        hits["primID"].astype(np.int64),
+        np.stack([1 - u - v, u, v], axis=1),
+        hits["tfar"].astype(np.float64),
+    )
+
+
+def outline(a: Seen, b: Seen) -> float:
+    """The share of the rays that meet only one of two meshes, of those that meet any."""
+    return float((a.met != b.met).sum() / max(int((a.met | b.met).sum()), 1))
+
+
+def apart(a: Seen, b: Seen) -> Floats:
+    """Distances of two meshes along the rays that meet both."""
+    both = a.met & b.met
+    return np.asarray(np.abs(a.distance - b.distance)[both])
+
 
 #: Objects, and images, that stand for all; texels a side of the corner used of each image.
 TRIED, CORNER = 4, 512
@@ -71,9 +158,9 @@ def octree_experiment(scene: Scene) -> Experiment:
     """The experiment of the octree texture of all triangles of a scene."""
     points, triangles = welded(scene.points, scene.triangles)
     triangles, _ = distinct(triangles)
-    rays = Rays.around(points[triangles].reshape(-1, 3))
+    rays = ViewerRays.around(points[triangles].reshape(-1, 3))
     truth = look(rays, points, triangles)
-    own = corner_normals(points, triangles)
+    normals = corner_normals(points, triangles)
     base = replace(ApoOptions(), faces=max(4, min(ApoOptions.faces, len(triangles) // 4)))
     warm_objects()
 
@@ -86,7 +173,7 @@ def octree_experiment(scene: Scene) -> Experiment:
         corner = mesh.points[mesh.triangles[seen.triangle[both]]]
         place = np.einsum("nk,nkx->nx", seen.weight[both], corner)
         normal = look_up(octree, (place - octree.low) / octree.side).normals
-        right = np.einsum("nk,nkx->nx", truth.weight[both], own[truth.triangle[both]])
+        right = np.einsum("nk,nkx->nx", truth.weight[both], normals[truth.triangle[both]])
         angle = _angles(normal, right)
         stream, _ = streamed(octree.texels, octree)
         size = float(len(stream) + len(glb_of(mesh)))
@@ -165,19 +252,19 @@ def prepare_coarse(subject: Subject) -> Experiment:
 
 def coarse_experiment(scene: Scene, parts: Sequence[Part]) -> Experiment:
     """The experiment of the coarse meshes of a campus."""
-    own = CampusOptions(lightmaps="none")
+    defaults = CampusOptions(lightmaps="none")
     meshes = []
     for part in parts:
         used, index = np.unique(scene.triangles[part.triangles], return_inverse=True)
         meshes.append(Mesh(scene.points[used], index.reshape(-1, 3).astype(np.int32)))
-    rays = [Rays.around(mesh.points) for mesh in meshes]
+    rays = [ViewerRays.around(mesh.points) for mesh in meshes]
     truths = [look(ray, m.points, m.triangles) for ray, m in zip(rays, meshes, strict=True)]
 
     def coarse(mesh: Mesh, options: CampusOptions) -> Mesh:
         return levels(mesh, 2, options.ratio, options.faces, options.error)[0].mesh
 
     def measure(setting: Setting) -> Measurement:
-        options = replace(own, **setting.knobs)
+        options = replace(defaults, **setting.knobs)
         made, seconds = timed(lambda: [coarse(mesh, options) for mesh in meshes])
         seen = [look(ray, m.points, m.triangles) for ray, m in zip(rays, made, strict=True)]
         off = [apart(a, b) for a, b in zip(truths, seen, strict=True)]
@@ -186,11 +273,11 @@ def coarse_experiment(scene: Scene, parts: Sequence[Part]) -> Experiment:
             seconds=seconds,
             work=float(sum(len(mesh.triangles) for mesh in made)),
             error=float(np.concatenate(off).mean()),
-            worst=max(float(np.percentile(each, 95)) for each in off),
+            worst=max(float(np.percentile(distances, 95)) for distances in off),
             more={"outline": float(np.mean(edges))},
         )
 
-    coarse(meshes[-1], own)  # compiles it
+    coarse(meshes[-1], defaults)  # compiles it
     settings = [
         Setting(f"--{name} {value:g}", {name: value})
         for name, values in (
@@ -212,10 +299,10 @@ def prepare_light(subject: Subject) -> Experiment:
     return light_experiment(scene, _largest(scene))
 
 
-def light_experiment(scene: Scene, parts: Sequence[Part], most: int = MAX_SAMPLES) -> Experiment:
-    """The experiment of the rays of baked light, before it is smoothed; ``most``: rays of the
+def light_experiment(scene: Scene, parts: Sequence[Part], limit: int = MAX_SAMPLES) -> Experiment:
+    """The experiment of the rays of baked light, before it is smoothed; ``limit``: rays of the
     reference."""
-    around, own = Occluders.from_scene(scene), CampusOptions()
+    around, defaults = Occluders.from_scene(scene), CampusOptions()
     random = np.random.default_rng(0)
     chosen = []
     for part in parts:
@@ -227,9 +314,9 @@ def light_experiment(scene: Scene, parts: Sequence[Part], most: int = MAX_SAMPLE
     point = points_on(corner[face], np.arange(1, len(face) + 1))
 
     def lit(samples: int, turn: Floats) -> Floats:
-        return Light(around, corner, samples, own.reach)(face, point, turn).astype(np.float64)
+        return Light(around, corner, samples, defaults.reach)(face, point, turn).astype(np.float64)
 
-    truth, again = (lit(most, random.random(len(face))) for _ in range(2))
+    truth, again = (lit(limit, random.random(len(face))) for _ in range(2))
     turn = random.random(len(face))
 
     def measure(setting: Setting) -> Measurement:
@@ -245,7 +332,7 @@ def light_experiment(scene: Scene, parts: Sequence[Part], most: int = MAX_SAMPLE
     settings = [
         Setting(f"--samples {n}", {"samples": n}, "samples")
         for n in (1, 4, 16, 64, 256, 1024)
-        if n < most
+        if n < limit
     ]
     noise = float(np.sqrt(np.square(255 * (truth - again)).mean() / 2))
     error = "RMS error of linear light, of 255"
@@ -325,8 +412,8 @@ def _largest(scene: Scene) -> list[Part]:
     return sorted(parts, key=lambda part: -len(part.triangles))[:TRIED]
 
 
-def _angles(one: Floats, other: Floats) -> Floats:
+def _angles(a: Floats, b: Floats) -> Floats:
     """(n,) degrees between (n, 3) vectors."""
-    long = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
-    cosine = np.einsum("nx,nx->n", one, other) / np.maximum(long, np.finfo(float).tiny)
+    long = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    cosine = np.einsum("nx,nx->n", a, b) / np.maximum(long, np.finfo(float).tiny)
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))))

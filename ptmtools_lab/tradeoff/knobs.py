@@ -8,7 +8,7 @@ again in a copy, and the others count their time with the database's own options
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -53,8 +53,8 @@ class Knob:
     @property
     def option(self) -> str:
         """The option as a user gives it, with its dashes."""
-        option = next(each for each in fields(self.stage.options) if each.name == self.field)
-        return f"--{option_name(option)}"
+        declared = {option.name: option for option in fields(self.stage.options)}
+        return f"--{option_name(declared[self.field])}"
 
     def text(self, value: Any) -> str:
         """A value as a user gives it."""
@@ -87,7 +87,7 @@ KNOBS = (
 
 
 @dataclass(frozen=True)
-class Setting:
+class KnobSetting:
     """One knob at another value than the database's own.
 
     Attributes
@@ -108,21 +108,21 @@ class Setting:
 
 
 def settings(
-    own: Mapping[Stage[Any], Options],
+    recorded: Mapping[Stage[Any], Options],
     longest: int,
     named: Collection[str] = (),
     *,
     quick: bool = False,
-) -> Iterator[Setting]:
-    """Settings to try beside the ``own`` options of a database whose longest texture side is
+) -> Iterator[KnobSetting]:
+    """Settings to try beside the ``recorded`` options of a database whose longest texture side is
     ``longest`` texels: of all knobs, or of the ``named`` options, such as "max-side"; with
-    ``quick``, one value of each. A stage without ``own`` options has no settings."""
+    ``quick``, one value of each. A stage without ``recorded`` options has no settings."""
     for knob in KNOBS:
         if named and knob.option.removeprefix("--") not in named:
             continue
-        if knob.stage not in own:
+        if knob.stage not in recorded:
             continue
-        options = own[knob.stage]
+        options = recorded[knob.stage]
         current = getattr(options, knob.own or knob.field)
         values = (*knob.values, *(knob.slow if named else ()))
         if knob.of_longest:
@@ -131,16 +131,16 @@ def settings(
         for value in chosen[:1] if quick else chosen:
             with suppress(InputError):  # if the other options do not allow it
                 changed = replace(options, **{knob.field: value})
-                yield Setting(knob, value, knob.text(current), changed)
+                yield KnobSetting(knob, value, knob.text(current), changed)
 
 
-def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
+def concerned(stage: Stage[Any], recorded: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
     """A stage and those that depend on its result, in their order."""
     result = [stage]
     for later in STAGES.values():
-        if later not in own or later in result:
+        if later not in recorded or later in result:
             continue
-        if {*later.read_with(own[later]), *later.heeds} & set(result):
+        if {*later.read_with(recorded[later]), *later.heeds} & set(result):
             result.append(later)
     return result
 
@@ -149,7 +149,7 @@ def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stag
 Seconds = dict[str, float]
 Own = Mapping[Stage[Any], Options]
 #: A shorter run of a stage is measured again, and the lesser time counts, s.
-_BRIEF = 1.0
+BRIEF = 1.0
 
 
 def own_options(artifacts: Artifacts) -> Own:
@@ -176,11 +176,13 @@ def build_again(db: Path, options: Own) -> Seconds:
     result: Seconds = {}
     for stage, chosen in options.items():
         run = partial(run_stage, db, chosen, workers=1, rebuild=True)
-        compiled = compilations()
-        _, seconds = timed(run)
-        if compilations() > compiled:
-            _, seconds = timed(run)
-        elif seconds < _BRIEF:
-            seconds = min(seconds, timed(run)[1])
-        result[stage.name] = seconds
+        _, seconds = compiled_and_timed(run)
+        result[stage.name] = seconds if seconds >= BRIEF else min(seconds, timed(run)[1])
     return result
+
+
+def compiled_and_timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    """As `timed`, of a second call if the first one compiled kernels."""
+    compiled = compilations()
+    result = timed(work)
+    return result if compilations() == compiled else timed(work)

@@ -39,7 +39,7 @@ TRIED, POINTS = 4, 2_000
 MOST = 4_096
 
 
-def prepare_lightmaps(subject: Subject, most: int = MOST) -> Experiment:
+def prepare_lightmaps(subject: Subject, limit: int = MOST) -> Experiment:
     """See `EXPERIMENTS`. The light is baked, even if the database has that of its model."""
     artifacts = subject.artifacts
     scene, lights = artifacts[SCENE], lights_of(artifacts)
@@ -50,45 +50,44 @@ def prepare_lightmaps(subject: Subject, most: int = MOST) -> Experiment:
     def pieces(density: float) -> list[CellSurfaces]:
         return pieces_of(geometry, artifacts[CELLS], dark, 1 / density, replaced)
 
-    around, own = Occluders.from_scene(scene), pieces(options.light_density)
-    mix = light_mix(around, own, lamps_of(scene, lights), options, ABOVE, WHITE)
-    lit = [n for n, piece in enumerate(own) if not piece.glass.all()]
+    around, fine = Occluders.from_scene(scene), pieces(options.light_density)
+    mix = light_mix(around, fine, lamps_of(scene, lights), options, ABOVE, WHITE)
+    lit = [n for n, piece in enumerate(fine) if not piece.glass.all()]
     chosen = np.unique(np.linspace(0, len(lit) - 1, min(TRIED, len(lit))).astype(int)).tolist()
-    return lightmap_experiment(
-        LightBaking(around, options, mix), pieces, [lit[n] for n in chosen], most
-    )
+    cells = [lit[n] for n in chosen]
+    return lightmap_experiment(LightBaking(around, options, mix), pieces, cells, limit)
 
 
 def lightmap_experiment(
     baking: LightBaking,
     pieces: Callable[[float], list[CellSurfaces]],
     cells: Sequence[int],
-    most: int,
+    limit: int,
 ) -> Experiment:
     """The experiment of the texels and rays of the lightmaps of some cells. ``pieces``: of all
-    cells, for texels to the metre; ``most``: rays of the reference."""
-    own, random = baking.options, np.random.default_rng(0)
-    exact = replace(baking, options=replace(own, light_samples=most))
+    cells, for texels to the metre; ``limit``: rays of the reference."""
+    recorded, random = baking.options, np.random.default_rng(0)
+    exact = replace(baking, options=replace(recorded, light_samples=limit))
     places: list[tuple[Ints, Floats]] = []
     truth, again = [], []
-    for piece in (pieces(own.light_density)[cell] for cell in cells):
+    for piece in (pieces(recorded.light_density)[cell] for cell in cells):
         corner = piece.corner.astype(np.float64)
         area = np.where(piece.glass, 0.0, areas(corner))
         face = random.choice(len(area), POINTS, p=area / area.sum())
         share = random.dirichlet((1, 1, 1), POINTS)
         point = np.einsum("nk,nkx->nx", share, corner[face])
         look = exact.look(corner, exact.sides(corner, piece.side), piece.face)
-        one, other = (look(face, point, random.random(POINTS)) for _ in range(2))
-        open_to = one >= COVERED
+        first, second = (look(face, point, random.random(POINTS)) for _ in range(2))
+        open_to = first >= COVERED
         places.append((face[open_to], share[open_to]))
-        truth.append(expose(one[open_to]))
-        again.append(expose(other[open_to]))
-        replace(baking, options=replace(own, light_samples=1)).light(piece)  # compiles it
+        truth.append(expose(first[open_to]))
+        again.append(expose(second[open_to]))
+        replace(baking, options=replace(recorded, light_samples=1)).light(piece)  # compiles it
     right = np.concatenate([np.zeros(0), *truth])
     noise = 255 * (np.concatenate([np.zeros(0), *again]) - right)
 
     def measure(setting: Setting) -> Measurement:
-        options = replace(own, **setting.knobs)
+        options = replace(recorded, **setting.knobs)
         chosen = [pieces(options.light_density)[cell] for cell in cells]
         with_options = replace(baking, options=options)
         made, seconds = timed(lambda: [with_options.light(piece) for piece in chosen])
@@ -109,7 +108,7 @@ def lightmap_experiment(
         Setting(f"--light-{name} {value:g}", {f"light_{name}": value}, name)
         for name, some in values.items()
         for value in some
-        if name != "samples" or value < most
+        if name != "samples" or value < limit
     ]
     return Experiment(
         f"texels of the lightmaps of {len(cells)} cells",

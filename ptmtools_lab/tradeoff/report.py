@@ -152,34 +152,37 @@ def sentences(trade: WalkTrade) -> list[str]:
         representative(list(some), trade.own)
         for _, some in groupby(trade.trials, lambda tried: tried.option)
     ]
-    return [sentence(tried, trade) for tried in sorted(chosen, key=partial(_price, own=trade.own))]
+    return [
+        sentence(tried, trade) for tried in sorted(chosen, key=partial(_price, unchanged=trade.own))
+    ]
 
 
-def _price(tried: WalkTrial, own: WalkTrial) -> tuple[int, float]:
+def _price(tried: WalkTrial, unchanged: WalkTrial) -> tuple[int, float]:
     """The rank of a setting: it only saves bytes or seconds or improves the picture, has gains and
     losses, changes nothing, only loses, or could not be tested; and within a rank the sum of the
     losses less that of the gains, as shares."""
     if tried.problem:
         return 4, 0.0
-    changes = [_more_bytes(tried, own), _longer(tried, own) / max(own.build, _BRIEF)]
-    if any(_noticed(*pair) for pair in _pairs(tried, own)):
-        changes.append(_change(tried, own))
+    longer = _longer(tried, unchanged) / max(unchanged.build, _BRIEF)
+    changes = [_more_bytes(tried, unchanged), longer]
+    if any(_noticed(*pair) for pair in _pairs(tried, unchanged)):
+        changes.append(_change(tried, unchanged))
     gains, losses = any(c < 0 for c in changes), any(c > 0 for c in changes)
     rank = (1 if losses else 0) if gains else (3 if losses else 2)
     return rank, sum(changes)
 
 
-def representative(some: Sequence[WalkTrial], own: WalkTrial) -> WalkTrial:
+def representative(some: Sequence[WalkTrial], unchanged: WalkTrial) -> WalkTrial:
     """The setting of a knob to report: the best picture, if that is better than the database's own;
     else, of those without a visible difference, the one that saves most bytes, then seconds; else
     the one that loses least."""
     valid = [tried for tried in some if not tried.problem]
     if not valid:
         return some[0]
-    least = min(valid, key=lambda tried: _change(tried, own))
-    if any(_noticed(*pair) for pair in _pairs(least, own)):
+    least = min(valid, key=lambda tried: _change(tried, unchanged))
+    if any(_noticed(*pair) for pair in _pairs(least, unchanged)):
         return least
-    alike = [t for t in valid if not any(_noticed(*pair) for pair in _pairs(t, own))]
+    alike = [t for t in valid if not any(_noticed(*pair) for pair in _pairs(t, unchanged))]
     return min(alike, key=lambda tried: (tried.served, tried.build))
 
 
@@ -187,9 +190,9 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
     """The savings of a setting, and its visible effect."""
     if tried.problem:
         return f"{tried.name} cannot be tested: {tried.problem}."
-    own = trade.own
-    saved = _saved(tried, own)
-    pairs = _pairs(tried, own)
+    unchanged = trade.own
+    saved = _saved(tried, unchanged)
+    pairs = _pairs(tried, unchanged)
     cases = [seen.case for _, seen in pairs]
     noticed = [pair for pair in pairs if _noticed(*pair)]
     changes = []
@@ -199,7 +202,7 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
             for was, now in some
         ]
         changes.append(f"{way} {_and(parts)}")
-    policies = {seen.policy for _, seen in pairs} - {seen.policy for seen in own.seen[:1]}
+    policies = {seen.policy for _, seen in pairs} - {seen.policy for seen in unchanged.seen[:1]}
     client = f" for the client {policies.pop()}" if len(policies) == 1 else ""
     if not changes:
         seen = f"no visible difference{client}"
@@ -210,28 +213,28 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
     return f"{tried.name} instead of {tried.own} {saved}; {seen}."
 
 
-def _saved(tried: WalkTrial, own: WalkTrial) -> str:
+def _saved(tried: WalkTrial, unchanged: WalkTrial) -> str:
     parts = []
-    if more := _more_bytes(tried, own):
+    if more := _more_bytes(tried, unchanged):
         parts.append(
             f"increases the total size by {_percent(more)}" if more > 0 else
             f"reduces the total size by {_percent(-more)}"
         )  # fmt: skip
-    if longer := _longer(tried, own):
+    if longer := _longer(tried, unchanged):
         parts.append(f"builds {abs(longer):.1f} s {'slower' if longer > 0 else 'faster'}")
     return _and(parts) if parts else "costs the same"
 
 
-def _more_bytes(tried: WalkTrial, own: WalkTrial) -> float:
+def _more_bytes(tried: WalkTrial, unchanged: WalkTrial) -> float:
     """The change of the bytes served, as a share; 0 if it is not relevant."""
-    more = tried.served / max(own.served, 1) - 1
+    more = tried.served / max(unchanged.served, 1) - 1
     return more if abs(more) >= _BYTES else 0.0
 
 
-def _longer(tried: WalkTrial, own: WalkTrial) -> float:
+def _longer(tried: WalkTrial, unchanged: WalkTrial) -> float:
     """The change of the seconds to build; 0 if it is not relevant."""
-    longer = tried.build - own.build
-    return longer if abs(longer) >= max(_SECONDS * own.build, _BRIEF) else 0.0
+    longer = tried.build - unchanged.build
+    return longer if abs(longer) >= max(_SECONDS * unchanged.build, _BRIEF) else 0.0
 
 
 def _and(parts: Sequence[str]) -> str:
@@ -255,14 +258,14 @@ def _where(case: Case, cases: Sequence[Case]) -> str:
     return f"{text} by {policy}" if len({c[0] for c in cases}) > 1 else text
 
 
-def _pairs(tried: WalkTrial, own: WalkTrial) -> list[tuple[WalkOutcome, WalkOutcome]]:
+def _pairs(tried: WalkTrial, unchanged: WalkTrial) -> list[tuple[WalkOutcome, WalkOutcome]]:
     """The outcomes of the database's own options and of the setting, case by case."""
-    return [(was, now) for now in tried.seen if (was := own.by(now.case))]
+    return [(was, now) for now in tried.seen if (was := unchanged.by(now.case))]
 
 
-def _change(tried: WalkTrial, own: WalkTrial) -> float:
+def _change(tried: WalkTrial, unchanged: WalkTrial) -> float:
     """Mean change of e over the cases, as a share."""
-    pairs = _pairs(tried, own)
+    pairs = _pairs(tried, unchanged)
     return sum((now.e - was.e) / max(was.e, _STEPS) for was, now in pairs) / max(len(pairs), 1)
 
 

@@ -35,6 +35,7 @@ from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, HintSampler
 from ptmtools.errors import MissingComponentError
+from ptmtools.output.served import read_served
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.texture import (
@@ -49,6 +50,10 @@ from ptmtools.texture.profiles import PROFILES
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
+from ptmtools_lab.comparing import SimulateOptions, play, require_hints
+from ptmtools_lab.path.making import path_through
+from ptmtools_lab.path.options import PathOptions
+from ptmtools_lab.policies.paper import PaperOptions
 from ptmtools_lab.tradeoff.experiment import (
     Experiment,
     Measurement,
@@ -57,6 +62,7 @@ from ptmtools_lab.tradeoff.experiment import (
     decibels,
     timed,
 )
+from ptmtools_lab.world import World, prepare
 
 #: Leaves of a subdivision that only serves for compilation.
 WARM = 4
@@ -64,12 +70,12 @@ WARM = 4
 
 def prepare_cells(subject: Subject) -> Experiment:
     """See `EXPERIMENTS`."""
-    scene, own = subject.artifacts[SCENE], subject.options(CELLS)
-    few = subdivide(scene, replace(own, max_leaves=WARM))
+    scene, recorded = subject.artifacts[SCENE], subject.options(CELLS)
+    few = subdivide(scene, replace(recorded, max_leaves=WARM))
     compute_pvs(few, PvsOptions(method="fast"))  # compiles both
 
     def measure(setting: Setting) -> Measurement:
-        cells, seconds = timed(lambda: subdivide(scene, replace(own, **setting.knobs)))
+        cells, seconds = timed(lambda: subdivide(scene, replace(recorded, **setting.knobs)))
         mean, worst = compute_pvs(cells, PvsOptions(method="fast")).volume_at_hand
         return Measurement(
             seconds=seconds,
@@ -79,7 +85,7 @@ def prepare_cells(subject: Subject) -> Experiment:
             more={"cells": float(cells.cell_count), "portals": float(cells.portal_count)},
         )
 
-    areas = [own.wall_area * factor for factor in (4, 2, 1, 0.5)]
+    areas = [recorded.wall_area * factor for factor in (4, 2, 1, 0.5)]
     settings = [
         Setting(f"--cells {kind} --wall-area {area:g}", {"cells": kind, "wall_area": area}, kind)
         for kind in ("room", "leaf")
@@ -240,7 +246,7 @@ def prepare_textures(subject: Subject) -> Experiment:
     return textures_experiment(subject.artifacts.original(SCENE).images, subject.options(TEXTURES))
 
 
-def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Experiment:
+def textures_experiment(images: Sequence[SourceImage], recorded: EncodeOptions) -> Experiment:
     """The experiment of the texture profiles, on corners of a few images."""
     chosen = np.linspace(0, len(images) - 1, min(TRIED, len(images))).astype(int)
     whole = [read_image(images[i].load()) for i in np.unique(chosen)]
@@ -253,17 +259,17 @@ def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Ex
         knobs = {"profile": name} if profile.lossy else {"profile": name, "max_error": 0}
         with suppress(MissingComponentError):
             if corners:  # compiles the kernels
-                encode(corners[0][:8, :8], replace(own, **knobs))
+                encode(corners[0][:8, :8], replace(recorded, **knobs))
             settings.append(Setting(f"--profile {name}", knobs))
 
     def measure(setting: Setting) -> Measurement:
-        options = replace(own, **setting.knobs)
+        options = replace(recorded, **setting.knobs)
         files, seconds = timed(lambda: [encode(pixels, options) for pixels in corners])
         pairs = list(zip(files, corners, strict=True))
         square = np.array([_square_error(_at_prefix(*pair), pair[1]) for pair in pairs])
         size = np.array([pixels.size for pixels in corners])
         error = math.sqrt((square * size).sum() / max(size.sum(), 1))
-        other = sum(int((decode(data) != pixels).sum()) for data, pixels in pairs)
+        inexact = sum(int((decode(data) != pixels).sum()) for data, pixels in pairs)
         raw = sum(pixels.nbytes for pixels in corners)
         return Measurement(
             seconds=seconds * times,
@@ -273,7 +279,7 @@ def textures_experiment(images: Sequence[SourceImage], own: EncodeOptions) -> Ex
             more={
                 "PSNR": decibels(error),
                 "ratio": sum(map(len, files)) / max(raw, 1),
-                "inexact": other / max(size.sum(), 1),
+                "inexact": inexact / max(size.sum(), 1),
             },
         )
 
@@ -354,3 +360,51 @@ def visibility_experiment(cells: Cells, budget: int) -> Experiment:
     ]
     error = "ratio of wrong to right pairs of cells"
     return Experiment("operations", error, settings, measure)
+
+
+#: Duration of the walk, s; link, and texture memory while the visitor moves.
+DURATION, BANDWIDTH, MEMORY = 60.0, "512k", "10%"
+
+
+def prepare_client(subject: Subject) -> Experiment:
+    """See `EXPERIMENTS`.
+
+    Raises as `read_served` and `require_hints`.
+    """
+    served = read_served(subject.artifacts.db.path)
+    require_hints(served, SimulateOptions(policy="paper").policies)
+    walk = path_through(subject.artifacts, PathOptions(duration=DURATION)).walk
+    return client_experiment(prepare(served, walk))
+
+
+def client_experiment(world: World) -> Experiment:
+    """The experiment on a walk."""
+    options = SimulateOptions(policy="paper", bandwidth=BANDWIDTH, memory=MEMORY)
+
+    def measure(setting: Setting) -> Measurement:
+        paper = PaperOptions(**setting.knobs)
+        (played,), seconds = timed(lambda: play({"": world}, options, paper=paper))
+        measures = played.measures
+        return Measurement(
+            seconds=seconds,
+            work=float(measures.bytes),
+            error=measures.e.mean,
+            worst=measures.e.p95,
+            more={"memory": float(played.run.memory.max())},
+        )
+
+    play({"": world.standing(1.0)}, options)  # compiles it
+    settings = [
+        Setting(f"--{name.replace('_', '-')} {value}", {name: value})
+        for name, values in (
+            ("delta_t", (0.1, 0.25, 0.5, 1.0, 2.0, 5.0)),
+            ("delta_t_static", (1.0, 5.0, 80.0)),
+            ("static_memory", ("5%", "40%", "inf")),
+        )
+        for value in values
+    ]
+    error = (
+        f"e, of 255, of a walk of {world.track.time[-1]:.0f} s at {BANDWIDTH}bit/s, memory {MEMORY}"
+    )
+    units = {"work": "B", "memory": "B"}
+    return Experiment("bytes received", error, settings, measure, by_work=True, units=units)

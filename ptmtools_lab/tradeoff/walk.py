@@ -35,12 +35,14 @@ from ptmtools_lab.forms import PTM
 from ptmtools_lab.measures import SHARES
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.report import rate_text
-from ptmtools_lab.tables import limited
-from ptmtools_lab.tradeoff.experiment import Deadline
+from ptmtools_lab.tables import Drawing, limited
+from ptmtools_lab.tradeoff.experiment import Deadline, timed
 from ptmtools_lab.tradeoff.knobs import (
+    BRIEF,
+    KnobSetting,
     Own,
-    Setting,
     build_again,
+    compiled_and_timed,
     concerned,
     copied,
     own_options,
@@ -94,8 +96,8 @@ class WalkOptions(SimulateOptions):
     def for_walk(self, world: World) -> WalkOptions:
         """These options with links and memory in place of `AUTO`."""
         memory, received = needs_of(world)
-        seconds = max(float(world.time[-1] - world.time[0]), 1.0)
-        rates = (min(8 * received / (part * seconds), most) for part, most in _LINKS)
+        seconds = max(float(world.track.time[-1] - world.track.time[0]), 1.0)
+        rates = (min(8 * received / (part * seconds), limit) for part, limit in _LINKS)
         texts = dict.fromkeys(f"{max(float(f'{rate:.2g}'), 1):.0f}" for rate in rates)
         return replace(
             self,
@@ -115,12 +117,12 @@ def needs_of(world: World) -> tuple[int, int]:
     column = np.zeros((views.frames, stock.texture_count), np.int64)
     np.maximum.at(column, (view[texture], views.texture[texture]), level[texture])
     column = np.minimum(column, stock.levels)
-    each = np.arange(stock.texture_count)
-    memory = stock.memory[each, column].sum(axis=1)
+    textures = np.arange(stock.texture_count)
+    memory = stock.memory[textures, column].sum(axis=1)
     cells = np.unique(views.cell[views.cell >= 0])
     files = stock.geometry_bytes[cells].sum() + stock.record_bytes[cells].sum()
-    received = stock.ends[each, column.max(axis=0, initial=0)].sum() + files + stock.index_bytes
-    return int(np.percentile(memory[world.view], _PICTURES)), int(received)
+    received = stock.ends[textures, column.max(axis=0, initial=0)].sum() + files + stock.index_bytes
+    return int(np.percentile(memory[world.track.view], _PICTURES)), int(received)
 
 
 #: Policy of the client, bandwidth of the link (bit/s, None for no limit), texture memory.
@@ -233,8 +235,8 @@ def try_settings(
     db, deadline = artifacts.db.path, deadline or Deadline()
     served = read_served(db)
     require_hints(served, options.policies)
-    own = own_options(artifacts)
-    priced = {stage: of_stage for stage, of_stage in own.items() if artifacts.is_stored(stage)}
+    recorded = own_options(artifacts)
+    priced = {stage: of_stage for stage, of_stage in recorded.items() if artifacts.is_stored(stage)}
     chosen = list(settings(priced, _longest(served), knobs, quick=quick))
     if knobs and not chosen:
         raise InputError(
@@ -248,7 +250,7 @@ def try_settings(
     progress(0, len(chosen), "trying settings")
     _warm_up()
     policies = ["", *dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy)]
-    trials = _Trials(db, own, _Walker(walk, original, options), policies)
+    trials = _Trials(db, recorded, _Walker(walk, original, options), policies)
     number, total = count(len(chosen), "setting"), sum(map(trials.estimate, chosen))
     where = " and ".join(rate_text(link.bandwidth) for link in options.links())
     limit = "" if total < deadline.left else f", of which {minutes(deadline.left)} are allowed"
@@ -259,7 +261,7 @@ def try_settings(
     tried: dict[int, WalkTrial] = {}
     for done, k in enumerate(by_turns(chosen)):
         if not tried or trials.estimate(chosen[k]) <= deadline.left:
-            tried[k] = trials.of(chosen[k])
+            tried[k] = trials.try_setting(chosen[k])
         progress(done + 1, len(chosen), "trying settings")
     untried = tuple(setting.name for k, setting in enumerate(chosen) if k not in tried)
     in_order = tuple(tried[k] for k in sorted(tried))
@@ -286,7 +288,7 @@ def require_prices(trade: WalkTrade, db: Path) -> None:
         )
 
 
-def by_turns(chosen: Sequence[Setting]) -> list[int]:
+def by_turns(chosen: Sequence[KnobSetting]) -> list[int]:
     """The numbers of settings, the first of each knob first, then the second of each."""
     turn: list[int] = []
     for k, setting in enumerate(chosen):
@@ -302,42 +304,43 @@ class _Trials:
     unchanged: the trial of the database itself.
     """
 
-    def __init__(self, db: Path, own: Own, walker: _Walker, policies: Sequence[str]) -> None:
-        self._db, self._own, self._walker = db, own, walker
-        begin = time.perf_counter()
+    def __init__(self, db: Path, recorded: Own, walker: _Walker, policies: Sequence[str]) -> None:
+        self._db, self._own, self._walker = db, recorded, walker
         with copied(db) as copy:
-            self._seconds = build_again(copy, own)
-            built = time.perf_counter()
-            world = compared(read_served(copy), walker.walk, walker.original)
-            self._walks = {policy: walker.walks(world, policy) for policy in policies}
-        #: Wall-clock seconds to build by seconds of one core, and of the walks of each setting.
-        self._slowness = (built - begin) / max(sum(self._seconds.values()), 1e-3)
-        self._walking = [time.perf_counter() - built]
-        outcomes = tuple(outcome for walks in self._walks.values() for outcome in walks)
-        built_seconds = sum(self._seconds.values())
-        self.unchanged = WalkTrial(
-            "", "", "", built_seconds, served_bytes(world.catalogue), outcomes
+            self._seconds = build_again(copy, recorded)
+            served, begin = read_served(copy), time.perf_counter()
+            world, drawing = timed(lambda: compared(served, walker.walk, walker.original))
+            drawn = time.perf_counter()
+        outcomes, walking = compiled_and_timed(
+            lambda: tuple(o for policy in policies for o in walker.walks(world, policy))
         )
+        # Seconds of one core for the walks of a setting; wall-clock seconds by those of a core.
+        self._walking = drawing + walking / len(policies)
+        self._slowness = [(drawn - begin) / max(drawing, 1e-3)]
+        build = sum(self._seconds.values())
+        self.unchanged = WalkTrial("", "", "", build, served_bytes(world.catalogue), outcomes)
 
-    def estimate(self, setting: Setting) -> float:
+    def estimate(self, setting: KnobSetting) -> float:
         """Wall-clock seconds that a setting takes."""
-        stages = concerned(setting.knob.stage, self._own)
-        building = sum(self._seconds[stage.name] for stage in stages)
-        return self._slowness * building + fmean(self._walking)
+        return fmean(self._slowness) * self._seconds_of(setting)
 
-    def of(self, setting: Setting) -> WalkTrial:
+    def _seconds_of(self, setting: KnobSetting) -> float:
+        stages = (self._seconds[s.name] for s in concerned(setting.knob.stage, self._own))
+        return sum(s if s >= BRIEF else 2 * s for s in stages) + self._walking
+
+    def try_setting(self, setting: KnobSetting) -> WalkTrial:
         """The trial of a setting."""
         stage, words = setting.knob.stage, (setting.name, setting.own, setting.knob.option)
+        begin = time.perf_counter()
         try:
             with copied(self._db) as copy:
                 options = {**self._own, stage: setting.options}
                 took = build_again(copy, {s: options[s] for s in concerned(stage, options)})
-                begin = time.perf_counter()
                 world = compared(read_served(copy), self._walker.walk, self._walker.original)
                 outcomes = tuple(self._walker.walks(world, setting.knob.policy))
-                self._walking.append(time.perf_counter() - begin)
         except PtmError as fault:
             return WalkTrial(*words, 0, 0, problem=fault.message)
+        self._slowness.append((time.perf_counter() - begin) / self._seconds_of(setting))
         build = sum({**self._seconds, **took}.values())
         return WalkTrial(*words, build, served_bytes(world.catalogue), outcomes)
 
@@ -362,15 +365,15 @@ class _Walker:
         )
         return [
             WalkOutcome(
-                each.run.policy,
-                each.run.conditions.bandwidth,
-                self._memory[each.memory],
-                each.measures.e.mean,
-                each.measures.e.p95,
-                each.measures.bytes,
-                each.measures.final[SHARES.index(FIRST)],
+                result.run.policy,
+                result.run.conditions.bandwidth,
+                self._memory[result.memory],
+                result.measures.e.mean,
+                result.measures.e.p95,
+                result.measures.bytes,
+                result.measures.final[SHARES.index(FIRST)],
             )
-            for each in play({"": counted(world, options)}, options)
+            for result in play({"": counted(world, options)}, options)
         ]
 
 
@@ -381,19 +384,20 @@ def compared(served: Served, walk: Walk, original: World) -> World:
     If only the finest levels of its textures, or previews, are missing, the tables of the original
     hold the errors without them; with the same geometry no rays are cast again.
     """
-    own, lossy, full = read_pyramids(served), read_lossy(served), original.pyramids
-    coarse = begins_with(full, own)
+    levels, lossy, full = read_pyramids(served), read_lossy(served), original.pyramids
+    coarse = begins_with(full, levels)
     same = _same(served.surfaces, original.served.surfaces)
     if not coarse or len(lossy.state):
-        own = full if coarse and (own.levels == full.levels).all() else own
-        return prepare(served, walk, own, full=full, same_maps=same, lossy=lossy)
+        levels = full if coarse and (levels.levels == full.levels).all() else levels
+        drawing = Drawing(lossy, full=full, same_maps=same)
+        return prepare(served, walk, levels, drawing=drawing)
     views = original.views if same else None
-    world = prepare(served, walk, full, views=views, lossy=lossy)
+    world = prepare(served, walk, full, views=views, drawing=Drawing(lossy))
     return replace(
         world,
-        pyramids=own,
-        catalogue=catalogue_of(served, own.differences, own.mean),
-        views=limited(world.views, own.levels),
+        pyramids=levels,
+        catalogue=catalogue_of(served, levels.differences, levels.mean),
+        views=limited(world.views, levels.levels),
     )
 
 
@@ -411,11 +415,11 @@ def begins_with(full: Pyramids, few: Pyramids) -> bool:
     return True
 
 
-def _same(one: Any, other: Any) -> bool:
+def _same(a: Any, b: Any) -> bool:
     """Whether two values are equal: arrays, or dataclasses of them such as `Surfaces`."""
-    if is_dataclass(one) and type(one) is type(other):
-        return all(_same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
-    return np.array_equal(one, other)
+    if is_dataclass(a) and type(a) is type(b):
+        return all(_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    return np.array_equal(a, b)
 
 
 def _longest(served: Served) -> int:

@@ -14,6 +14,7 @@ from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
 from ptmtools_lab.forms import FORMS
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare, read_forms
 from tests.builds import once
 from tests.e2e.conftest import Ptm, built_rooms, ptm
@@ -72,7 +73,7 @@ def interlaced_world(interlaced_rooms: Path, walk_file: Path) -> World:
     served = read_served(interlaced_rooms)
     pyramids = read_pyramids(served)
     forms = read_forms(served, pyramids, FORMS)
-    return prepare(served, read_walk(walk_file), pyramids, forms=forms)
+    return prepare(served, read_walk(walk_file), pyramids, drawing=Drawing(forms=forms))
 
 
 @pytest.fixture(scope="session")

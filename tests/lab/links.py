@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from hypothesis import strategies as st
 
 from ptmtools.link import Conditions, Step, Trace
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.network import FluidLink, Request
 
 PROTOCOL = st.sampled_from(["h1", "h2"])
 STEPS = st.builds(
@@ -46,7 +46,7 @@ ACTS = st.lists(
 class Client:
     """Plays acts on a link, and yields after each step."""
 
-    link: Link
+    link: FluidLink
     asked: list[Request] = field(default_factory=list)
     finished: list[Request] = field(default_factory=list)
 
@@ -72,7 +72,7 @@ class Client:
 
 def run(conditions: Conditions, acts: list[Act]) -> Client:
     """A client that has played its acts to their end."""
-    client = Client(Link(conditions))
+    client = Client(FluidLink(conditions))
     for _ in client.play(acts):
         pass
     return client

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given, strategies as st
 
 from ptmtools.link import Conditions
-from ptmtools_lab.client import Files, Kind, Range
-from ptmtools_lab.network import Link
+from ptmtools_lab.client import FileKind, Files, Range
+from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies.whole_files import LruClient
 from tests.lab.worlds import catalogue, raw, standing
 
@@ -22,14 +22,14 @@ ACTS = st.lists(
 @given(ACTS)
 def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
     """Whole ranges count."""
-    files = Files(Kind.TEXTURE, np.array([1000, 200]))
+    files = Files(FileKind.TEXTURE, np.array([1000, 200]))
     held = np.zeros(200, dtype=bool)
     under_way: list[Range] = []
     for act, number in acts:
         asked = int(files.asked[1])
         if act == "ask" and asked < 200:
             part = files.ask(1, min(200, asked + number))
-            assert (part.kind, part.number, part.begin) == (Kind.TEXTURE, 1, asked)
+            assert (part.kind, part.number, part.begin) == (FileKind.TEXTURE, 1, asked)
             under_way.append(part)
         elif act == "arrive" and under_way:
             part = under_way.pop(number % len(under_way))
@@ -45,7 +45,7 @@ def test_the_last_byte_counts() -> None:
     """A file, or a level, that lacks one is not there."""
     textures = [raw(8), raw(4)]
     stock = catalogue(textures, [(0, 0), (0, 1)])
-    client = LruClient(standing(stock, 1), Link(Conditions()), 1 << 40)
+    client = LruClient(standing(stock, 1), FluidLink(Conditions()), 1 << 40)
     for kind, files in client.files.items():
         for number, size in enumerate(files.size.tolist()):
             files.arrived(files.ask(number, size - 1))

@@ -101,14 +101,14 @@ def test_rooms_that_cannot_be_reached(
     db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Are told, by number."""
-    from ptmtools_lab.path.ground import Obstacles
+    from ptmtools_lab.path.ground import WalkObstacles
 
-    crossed = Obstacles.crossed
+    crossed = WalkObstacles.crossed
 
     def walled_up(self, start, end):  # type: ignore[no-untyped-def]
         return crossed(self, start, end) | (start[:, 0] * end[:, 0] <= 0)
 
-    monkeypatch.setattr(Obstacles, "crossed", walled_up)
+    monkeypatch.setattr(WalkObstacles, "crossed", walled_up)
     assert main(["path", str(db), "-o", str(tmp_path / "w.json")]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert "1 of 2 rooms" in first

@@ -23,10 +23,10 @@ from ptmtools_lab.comparing import SimulateOptions, budget_of, counted, play
 from ptmtools_lab.forms import PTM
 from ptmtools_lab.measures import Flip
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.renderer import FrameRenderer
 from ptmtools_lab.report import table
 from ptmtools_lab.simulation import simulate
-from ptmtools_lab.tables import look
+from ptmtools_lab.tables import Drawing, look
 from ptmtools_lab.world import World, read_forms
 from ptmtools_systems.interlace import deinterlace, read_manifest
 from tests.lab.conftest import Ptm
@@ -59,10 +59,10 @@ def test_the_levels_of_a_ptm_as_a_form_of_their_own(seed: int) -> None:
     other = Room(made.surfaces, [[255 - level for level in rows] for rows in made.levels]).pyramids
     for full in (None, other):
         views, same = look(
-            made.surfaces, made.pyramids, CAMERA, *eyes, forms=[own_levels(made.pyramids)],
-            full=full,
+            made.surfaces, made.pyramids, CAMERA, *eyes, 
+            drawing=Drawing(forms={"own": own_levels(made.pyramids)}, full=full),
         )  # fmt: skip
-        (alone,) = look(made.surfaces, made.pyramids, CAMERA, *eyes, full=full)
+        (alone,) = look(made.surfaces, made.pyramids, CAMERA, *eyes, drawing=Drawing(full=full))
         for name in ("start", "cell", "texture", "error", "square", "need", "sight"):
             assert getattr(views, name).tobytes() == getattr(same, name).tobytes(), name
             assert getattr(views, name).tobytes() == getattr(alone, name).tobytes(), name
@@ -85,7 +85,9 @@ def test_columns_against_slow_ones(seed: int) -> None:
     mean = random.uniform(0, 255, (3, 3))
     shows = Shows(pyramids, row, held, last, mean)
     eye, direction = pose(random)
-    _, views = look(made.surfaces, made.pyramids, CAMERA, eye, direction, forms=[shows])
+    _, views = look(
+        made.surfaces, made.pyramids, CAMERA, eye, direction, drawing=Drawing(forms={"": shows})
+    )
     rays, axes = CAMERA.rays(direction)
     expected: dict[tuple[int, int], NDArray[np.float64]] = {}
     for ray in rays.reshape(-1, 3):
@@ -203,18 +205,18 @@ def test_what_is_left_with_all_files_there(interlaced_world: World) -> None:
 
 def test_pictures_and_tables_of_a_form_agree(interlaced_world: World) -> None:
     world = interlaced_world.in_form("interlaced")
-    renderer = Renderer(world, world.camera.height, samples=1)
-    ours = Renderer(interlaced_world, world.camera.height, samples=1)
+    renderer = FrameRenderer(world, world.camera.height, samples=1)
+    ours = FrameRenderer(interlaced_world, world.camera.height, samples=1)
     stock, views = world.catalogue, world.views
     random = np.random.default_rng(1)
     there = np.ones(stock.cell_count, dtype=bool)
     for f in range(0, world.frames, 9):
-        sight = renderer.look(world.eye[f], world.direction[f])
+        sight = renderer.look(world.track.eye[f], world.track.direction[f])
         column = random.integers(0, stock.levels + 1)
         full = renderer.full(sight)
         assert (full == ours.full(sight)).all(), "both are compared with the same picture"
         apart = renderer.colors(sight, there, column) - full
-        rows = np.arange(len(views.error))[views.rows(int(world.view[f]))]
+        rows = np.arange(len(views.error))[views.rows(int(world.track.view[f]))]
         rows = rows[views.texture[rows] >= 0]
         expected = views.error[rows, column[views.texture[rows]] + 1].sum()
         drawn = np.sqrt((apart**2).mean(axis=2)).mean()

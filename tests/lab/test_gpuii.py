@@ -11,11 +11,11 @@ from hypothesis import given, settings, strategies as st
 
 from ptmtools.link import Conditions
 from ptmtools_lab.catalogue import Catalogue, Shapes
-from ptmtools_lab.client import Client, Kind, Range
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.client import Client, FileKind, Range
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.whole_files import RING, GpuiiClient
-from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.simulation import WalkRun, simulate
 from ptmtools_lab.world import World
 from tests.lab.worlds import (
     CAMERA,
@@ -45,15 +45,17 @@ def scene(*shapes: tuple[float, ...]) -> Catalogue:
     )
 
 
-def walked(stock: Catalogue, budget: int = 1 << 30, seconds: float = 20) -> tuple[Run, list[Range]]:
+def walked(
+    stock: Catalogue, budget: int = 1 << 30, seconds: float = 20
+) -> tuple[WalkRun, list[Range]]:
     """Who stands there; and the files asked for, in that order."""
     asked: list[Range] = []
 
-    def make(world: World, link: Link, budget: int) -> Client:
+    def make(world: World, link: FluidLink, budget: int) -> Client:
         ask = link.request
 
         def request(size: int, priority: float, tag: Any, *more: Any) -> Request:
-            if tag.kind == Kind.TEXTURE:
+            if tag.kind == FileKind.TEXTURE:
                 asked.append(tag)
             return ask(size, priority, tag, *more)
 
@@ -138,9 +140,11 @@ def test_what_was_loaded_stays_while_there_is_room() -> None:
     """Whoever turns away and back finds it."""
     stock = scene((1.0, side(1e6)))
     world = stands(stock, 20)
-    away = (world.time > 10) & (world.time < 15)
-    direction = np.where(away[:, None], [-1.0, 0, 0], world.direction)
-    world = for_policy(replace(world, direction=direction), "gpuii")
+    away = (world.track.time > 10) & (world.track.time < 15)
+    direction = np.where(away[:, None], [-1.0, 0, 0], world.track.direction)
+    world = for_policy(replace(world, track=replace(world.track, direction=direction)), "gpuii")
     run = simulate(world, POLICIES["gpuii"], Conditions(20e3), 256)
-    assert run.column[world.time > 9].ravel().tolist() == [3] * int((world.time > 9).sum())
+    assert run.column[world.track.time > 9].ravel().tolist() == [3] * int(
+        (world.track.time > 9).sum()
+    )
     assert run.requests == 3 + 3

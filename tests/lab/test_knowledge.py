@@ -12,11 +12,11 @@ from hypothesis import Phase, given, settings, strategies as st
 from ptmtools.arrays import Bools
 from ptmtools.link import Conditions
 from ptmtools_lab.catalogue import Catalogue
-from ptmtools_lab.client import Client, Kind
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.client import Client, FileKind
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.simulation import Run, simulate
-from ptmtools_lab.tables import Views
+from ptmtools_lab.simulation import WalkRun, simulate
+from ptmtools_lab.tables import WalkViews
 from ptmtools_lab.world import World
 from tests.lab.worlds import SEEDS, any_world, for_policy, leaf
 
@@ -30,11 +30,11 @@ BUDGETS = st.integers(1, 10_000)
 
 def played(
     policy: str, world: World, conditions: Conditions, budget: int
-) -> tuple[Run, Client, list[Request]]:
+) -> tuple[WalkRun, Client, list[Request]]:
     """A run, the client as it is in the end, and what it asked for."""
     clients, asked = [], []
 
-    def make(world: World, link: Link, budget: int) -> Client:
+    def make(world: World, link: FluidLink, budget: int) -> Client:
         ask = link.request
 
         def request(*given: Any, **more: Any) -> Request:
@@ -50,7 +50,9 @@ def played(
     return run, clients[0], asked
 
 
-def did(run: Run, _: Client, asked: list[Request], frames: int | None = None) -> tuple[Any, ...]:
+def did(
+    run: WalkRun, _: Client, asked: list[Request], frames: int | None = None
+) -> tuple[Any, ...]:
     """All that a client has done, until the last of its first frames."""
     until = run.time[:frames][-1]
     tables = [table[:frames].tobytes() for table in (run.column, run.loaded, run.fetched)]
@@ -67,8 +69,10 @@ def test_the_way_to_come(policy: str, seed: int, budget: int, frames: int) -> No
     first = np.where(before, np.arange(world.frames), 0)
     other = replace(
         world,
-        **{name: getattr(world, name)[first] for name in ("view", "eye", "direction")},
-        cell=np.where(before, world.cell, world.catalogue.cell_count - 1),
+        track=replace(
+            world.track.looking(first),
+            cell=np.where(before, world.track.cell, world.catalogue.cell_count - 1),
+        ),
     )
     runs = [played(policy, each, link, budget) for each in (world, other)]
     assert did(*runs[0], frames) == did(*runs[1], frames)
@@ -79,7 +83,8 @@ def test_the_oracle_knows_the_way_to_come() -> None:
     differ = []
     for seed in range(10):
         world = any_world(seed)
-        stays = replace(world, view=np.minimum(world.view, 4))
+        view = np.minimum(world.track.view, 4)
+        stays = replace(world, track=replace(world.track, view=view))
         runs = [played("oracle", each, Conditions(5e4, 0.0), 500) for each in (world, stays)]
         differ.append(did(*runs[0], 5) != did(*runs[1], 5))
     assert any(differ)
@@ -92,7 +97,7 @@ def test_what_has_not_come(policy: str, seed: int, link: Conditions, budget: int
     """Records and geometry may say anything as long as they have not come."""
     world = any_world(seed)
     known = played(policy, world, link, budget)
-    record, geometry = (known[1].files[kind].whole for kind in (Kind.RECORD, Kind.GEOMETRY))
+    record, geometry = (known[1].files[kind].whole for kind in (FileKind.RECORD, FileKind.GEOMETRY))
     stock = _scrambled(world.catalogue, record, geometry)
     other = replace(world, catalogue=stock, views=_unseen(world.views, geometry))
     assert did(*played(policy, other, link, budget)) == did(*known)
@@ -115,7 +120,7 @@ def _scrambled(stock: Catalogue, record: Bools, geometry: Bools) -> Catalogue:
     return replace(stock, records=tuple(records), shapes=scrambled)
 
 
-def _unseen(views: Views, geometry: Bools) -> Views:
+def _unseen(views: WalkViews, geometry: Bools) -> WalkViews:
     """Where they are not there, cells that show nothing."""
     sight = np.where(geometry[views.cell][:, None], views.sight, 0)
     depth = np.where((views.owner >= 0) & geometry[views.owner], views.depth, np.inf)

@@ -12,12 +12,12 @@ import pytest
 
 from ptmtools.link import Conditions
 from ptmtools_lab.measures import measure
-from ptmtools_lab.simulation import Run
+from ptmtools_lab.simulation import WalkRun
 
 
-def run_of(error: list[float], still: list[bool]) -> Run:
+def run_of(error: list[float], still: list[bool]) -> WalkRun:
     count = len(error)
-    return Run(
+    return WalkRun(
         policy="by hand",
         conditions=Conditions(),
         budget=100,

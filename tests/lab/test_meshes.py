@@ -7,7 +7,7 @@ import pytest
 
 from ptmtools.rendering.rays import Frustum
 from ptmtools.site.client import BEHIND, GROSS, NEAREST, SEEN
-from ptmtools_lab.meshes import Meshes, meshes_of
+from ptmtools_lab.catalogue import Meshes, meshes_of
 
 #: A cube of 2 m in cell 3 with two finer meshes, and one of 20 cm in cell 0 with one.
 ROWS = (

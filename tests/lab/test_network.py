@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from ptmtools.errors import InputError
 from ptmtools.link import Conditions, Step, Trace
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.network import FluidLink, Request
 from tests.lab.links import (
     ACTS,
     CONDITIONS,
@@ -31,7 +31,7 @@ def close(a: float, b: float) -> bool:
 
 @given(CONDITIONS, ACTS)
 def test_every_byte_is_accounted_for(conditions: Conditions, acts: list[Act]) -> None:
-    client = Client(link := Link(conditions))
+    client = Client(link := FluidLink(conditions))
     before = 0.0
     for _ in client.play(acts):
         held = link.bytes + link.overhead_bytes + link.partial
@@ -64,7 +64,7 @@ def test_requests_come_whole_and_not_too_early(conditions: Conditions, acts: lis
 @given(CONDITIONS, ACTS)
 def test_connections(conditions: Conditions, acts: list[Act]) -> None:
     """On h1 there are never more than allowed, and none is idle while something waits."""
-    client = Client(Link(conditions))
+    client = Client(FluidLink(conditions))
     for _ in client.play(acts):
         under_way = sum(r.sent is not None and r.ended is None for r in client.asked)
         waiting = [r for r in client.asked if r.sent is None and r.ended is None]
@@ -77,7 +77,7 @@ def test_connections(conditions: Conditions, acts: list[Act]) -> None:
 
 @given(CONDITIONS, ACTS)
 def test_what_has_arrived_stays(conditions: Conditions, acts: list[Act]) -> None:
-    client = Client(link := Link(conditions))
+    client = Client(link := FluidLink(conditions))
     held: dict[Request, float] = {}
     for _ in client.play(acts):
         for r in client.asked:
@@ -140,7 +140,7 @@ def test_as_by_small_steps(
     asks = sorted(asks)
     tick, end = 5e-4, 8.0
     reference = by_small_steps(conditions, asks, tick, end)
-    link = Link(conditions)
+    link = FluidLink(conditions)
     requests: list[Request] = []
     for when, size, rank in asks:
         while link.advance(when):
@@ -157,7 +157,7 @@ def test_as_by_small_steps(
 @given(PROTOCOL, st.integers(1, 6), st.integers(1, 10**6))
 def test_equal_requests(protocol: str, n: int, size: int) -> None:
     """h1 finishes them together, h2 one after the other."""
-    link = Link(Conditions(MEGABIT, 0.1, 300, protocol))
+    link = FluidLink(Conditions(MEGABIT, 0.1, 300, protocol))
     for i in range(n):
         link.request(size, 1.0, i)
     each = 8 * (size + 300) / MEGABIT
@@ -170,7 +170,7 @@ def test_equal_requests(protocol: str, n: int, size: int) -> None:
 
 
 def test_the_seventh_waits_for_a_connection() -> None:
-    link = Link(Conditions(MEGABIT, 0.1, 0))
+    link = FluidLink(Conditions(MEGABIT, 0.1, 0))
     first = [link.request(125, 0.0) for _ in range(6)]
     low, high = link.request(125, 1.0), link.request(125, 2.0)
     assert [r.sent for r in first] == [0.0] * 6
@@ -188,7 +188,7 @@ def test_the_seventh_waits_for_a_connection() -> None:
 @pytest.mark.parametrize("protocol", ["h1", "h2"])
 def test_a_response_of_several_parts_is_one_request(protocol: str) -> None:
     """Its parts end one after the other, as if each were alone; headers and latency come once."""
-    link = Link(Conditions(MEGABIT, 0.1, 300, protocol, connections=1))
+    link = FluidLink(Conditions(MEGABIT, 0.1, 300, protocol, connections=1))
     first = link.request(700, 1, "a", rest=((1000, "b"), (2000, "c")))
     other = link.request(1000, 0, "d")
     assert first.outstanding == 4000
@@ -207,7 +207,7 @@ def test_a_response_of_several_parts_is_one_request(protocol: str) -> None:
 
 
 def test_h2_serves_the_highest_priority() -> None:
-    link = Link(Conditions(MEGABIT, 0.1, 0, "h2"))
+    link = FluidLink(Conditions(MEGABIT, 0.1, 0, "h2"))
     low, high = link.request(12_500, 1.0), link.request(12_500, 2.0)
     assert link.advance(0.15) is None
     assert (low.received, high.received) == (0, pytest.approx(6_250))
@@ -225,7 +225,7 @@ def test_h2_serves_the_highest_priority() -> None:
 
 
 def test_h2_takes_what_becomes_more_urgent_at_once() -> None:
-    link = Link(Conditions(MEGABIT, 0.0, 0, "h2"))
+    link = FluidLink(Conditions(MEGABIT, 0.0, 0, "h2"))
     first, second = link.request(12_500, 2.0), link.request(12_500, 1.0)
     assert link.advance(0.05) is None
     link.reprioritise(second, 3.0)
@@ -238,7 +238,7 @@ def test_h2_takes_what_becomes_more_urgent_at_once() -> None:
 def test_without_a_limit_all_comes_after_the_latency(
     protocol: str, latency: float, sizes: list[int]
 ) -> None:
-    link = Link(Conditions(None, latency, 300, protocol))
+    link = FluidLink(Conditions(None, latency, 300, protocol))
     requests = [link.request(size, 1.0) for size in sizes]
     actual = [link.advance(latency) for _ in sizes]
     assert {id(r) for r in actual} == {id(r) for r in requests}
@@ -248,7 +248,7 @@ def test_without_a_limit_all_comes_after_the_latency(
 
 
 def test_without_a_limit_the_seventh_comes_after_two_latencies() -> None:
-    link = Link(Conditions(None, 0.1))
+    link = FluidLink(Conditions(None, 0.1))
     requests = [link.request(10**6, 1.0) for _ in range(7)]
     while link.advance(1.0):
         pass
@@ -258,7 +258,7 @@ def test_without_a_limit_the_seventh_comes_after_two_latencies() -> None:
 def test_a_trace_by_hand() -> None:
     """Down for a second, then a tenth of what the link would carry, at a latency of its own."""
     trace = Trace((Step(1.0, 0.0), Step(1.0, 100_000, latency=0.4)))
-    link = Link(Conditions(MEGABIT, 0.1, 0, trace=trace))
+    link = FluidLink(Conditions(MEGABIT, 0.1, 0, trace=trace))
     request = link.request(18_750, 1.0)
     assert link.advance(2.5) is None
     assert request.first_byte == 1.0
@@ -273,7 +273,7 @@ def test_a_trace_by_hand() -> None:
 def test_loss_slows_the_link_and_delays_some() -> None:
     def played(seed: int) -> list[float]:
         trace = Trace((Step(1e4, loss=0.2),))
-        link = Link(Conditions(MEGABIT, 0.1, 0, connections=1, trace=trace, seed=seed))
+        link = FluidLink(Conditions(MEGABIT, 0.1, 0, connections=1, trace=trace, seed=seed))
         requests = [link.request(1000, 1.0) for _ in range(500)]
         while link.advance(1000.0):
             pass
@@ -305,7 +305,7 @@ def test_links_that_cannot_be(options: dict[str, Any], message: str) -> None:
 
 
 def test_calls_that_make_no_sense() -> None:
-    link = Link(Conditions())
+    link = FluidLink(Conditions())
     link.advance(1.0)
     for until in (0.5, math.inf, math.nan):
         with pytest.raises(ValueError, match="cannot advance"):

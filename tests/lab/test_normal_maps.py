@@ -21,8 +21,9 @@ from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import read_walk
 from ptmtools_lab.catalogue import NORMALS
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.renderer import FrameRenderer
 from ptmtools_lab.simulation import simulate
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare, relief_of
 from tests.scene.bumpy import write_bumpy
 from tests.systems.apo.statues import write_rooms
@@ -146,14 +147,14 @@ def test_clients_fetch_them_after_the_textures(world: World) -> None:
 
 def test_pictures_of_a_walk_show_them(world: World) -> None:
     """With the levels that a client has."""
-    renderer = Renderer(world, 90)
+    renderer = FrameRenderer(world, 90)
     sight = renderer.look(np.array(EYE), np.array([0.0, 0.0, -1.0]))
     full = renderer.full(sight)
     loaded = np.ones(world.catalogue.cell_count, np.bool_)
     column = world.catalogue.levels.copy()
     assert np.abs(renderer.colors(sight, loaded, column) - full).max() < 1e-9
     column[number(world.served)] = 0
-    without = Renderer(replace(world, served=plain(world.served)), 90).full(sight)
+    without = FrameRenderer(replace(world, served=plain(world.served)), 90).full(sight)
     assert np.abs(renderer.colors(sight, loaded, column) - without).max() < 1e-9
     assert np.abs(full - without).max() > 20
 
@@ -167,9 +168,11 @@ def test_lit_walks_show_the_maps_of_objects(tmp_path: Path) -> None:
     assert main(["-q", *walk]) == 0
     served = with_lamp(read_served(db))
     relief = relief_of(served, read_pyramids(served))
-    world = prepare(served, read_walk(tmp_path / "walk.json"), rate=1, relief=relief)
+    world = prepare(
+        served, read_walk(tmp_path / "walk.json"), rate=1, drawing=Drawing(relief=relief)
+    )
     flat = replace(served, surfaces=replace(served.surfaces, relief=None))
-    renderer, other = Renderer(world, 90), Renderer(replace(world, served=flat), 90)
+    renderer, other = FrameRenderer(world, 90), FrameRenderer(replace(world, served=flat), 90)
     sight = renderer.look(np.array((-2.8, 0.6, 0.5)), np.array([0.0, 0.0, -1.0]))
     difference = np.abs(renderer.full(sight) - other.full(sight)).max(axis=2)
     assert (difference > 5).mean() > 0.1

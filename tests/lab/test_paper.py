@@ -11,12 +11,11 @@ import pytest
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.link import Conditions
-from ptmtools_lab.client import Client, Kind, Range
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.client import Client, FileKind, Range
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.policies.paper import PaperClient, PaperOptions
-from ptmtools_lab.policies.paper_kernels import refresh, share_out
-from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.policies.paper import PaperClient, PaperOptions, refresh, share_out
+from ptmtools_lab.simulation import WalkRun, simulate
 from ptmtools_lab.world import World
 from tests.lab.worlds import ROOM, Texture, catalogue, raw, standing, strolling, world
 
@@ -36,7 +35,7 @@ class Watched(PaperClient):
     asks: list[tuple[float, Range]]
     requests: list[Request]
 
-    def ask(self, kind: Kind, number: int, end: int, priority: float) -> None:
+    def ask(self, kind: FileKind, number: int, end: int, priority: float) -> None:
         before = int(self.files[kind].asked[number])
         self.asks = [
             *getattr(self, "asks", []),
@@ -47,11 +46,11 @@ class Watched(PaperClient):
 
 def played(
     made: World, conditions: Conditions, budget: int, options: PaperOptions | None = None
-) -> tuple[Run, Watched]:
+) -> tuple[WalkRun, Watched]:
     """A run of the paper's client, and the client."""
     clients: list[Client] = []
 
-    def make(made: World, link: Link, budget: int) -> Client:
+    def make(made: World, link: FluidLink, budget: int) -> Client:
         clients.append(Watched(made, link, budget, options or PaperOptions()))
         return clients[0]
 
@@ -107,7 +106,7 @@ def test_a_second_of_standing_makes_a_client_patient() -> None:
     stock = catalogue([LARGE], [(0, 0)])
     _, client = played(standing(stock, 5), bare(512e3), 4 * MIB)
     beyond = int(stock.ends[0, 7])
-    levels = [(when, part) for when, part in client.asks if part.kind == Kind.TEXTURE]
+    levels = [(when, part) for when, part in client.asks if part.kind == FileKind.TEXTURE]
     assert [part.end for _, part in levels[:8]] == stock.ends[0, 1:9].tolist()
     assert all(when < 1.0 for when, part in levels if part.end <= beyond)
     assert next(when for when, part in levels if part.end > beyond) == 1.0
@@ -117,7 +116,7 @@ def test_a_greater_budget_while_standing() -> None:
     """And what does not fit any more goes at once where the viewpoint moves on."""
     stock = catalogue([LARGE] * 2, [(0, 0), (0, 1)])
     parts = [strolling(stock, 3), standing(stock, 4), strolling(stock, 1)]
-    poses = [(w.eye, w.direction) for w in parts]
+    poses = [(w.track.eye, w.track.direction) for w in parts]
     made = world(stock, *(np.concatenate(part) for part in zip(*poses, strict=True)))
     run, _ = played(made, bare(None), 4 * MIB, PaperOptions(static_memory="16MiB"))
     stands = np.flatnonzero(run.still)
@@ -134,7 +133,7 @@ def test_how_long_a_viewpoint_is_still() -> None:
     """From when on its parameters are those of a static one."""
     stock = catalogue([LARGE] * 2, [(0, 0), (0, 1)])
     parts = [strolling(stock, 3), standing(stock, 8)]
-    poses = [(w.eye, w.direction) for w in parts]
+    poses = [(w.track.eye, w.track.direction) for w in parts]
     made = world(stock, *(np.concatenate(part) for part in zip(*poses, strict=True)))
     finest = {}
     for seconds in (1.0, 4.0):
@@ -150,7 +149,7 @@ def test_a_level_at_a_time() -> None:
     stock = catalogue([LARGE] * 3, [(0, 0), (0, 1), (0, 2)])
     _, client = played(strolling(stock, 20), Conditions(256e3), 16 * MIB)
     there: dict[int, int] = {}
-    for _, part in (ask for ask in client.asks if ask[1].kind == Kind.TEXTURE):
+    for _, part in (ask for ask in client.asks if ask[1].kind == FileKind.TEXTURE):
         assert part.begin == there.get(part.number, 0)
         assert part.end in stock.ends[part.number]
         assert np.searchsorted(stock.ends[0], part.end) == 1 + np.searchsorted(
@@ -319,39 +318,42 @@ def row_of_rooms() -> World:
 def test_the_next_cell_is_fetched_two_seconds_ahead() -> None:
     made = row_of_rooms()
     _, client = played(made, bare(None), 1000)
-    when = {part.number: when for when, part in client.asks if part.kind == Kind.RECORD}
+    when = {part.number: when for when, part in client.asks if part.kind == FileKind.RECORD}
     # The doors are at 4 m and 8 m.
-    early = [made.time[np.argmax(made.eye[:, 0] >= door - 2 - 1e-9)] for door in (4.0, 8.0)]
-    assert [when[1], when[2]] == pytest.approx(early, abs=1 / made.rate)
+    early = [
+        made.track.time[np.argmax(made.track.eye[:, 0] >= door - 2 - 1e-9)] for door in (4.0, 8.0)
+    ]
+    assert [when[1], when[2]] == pytest.approx(early, abs=1 / made.track.rate)
 
 
 def test_walls_are_no_doors() -> None:
     """The way leads past the door, which is from 1.5 m to 2.5 m."""
     made = row_of_rooms()
-    beside = replace(made, eye=made.eye - [0.0, 0.0, 1.0])
+    aside = made.track.eye - [0.0, 0.0, 1.0]
+    beside = replace(made, track=replace(made.track, eye=aside))
     _, client = played(beside, bare(None), 1000)
-    when = {part.number: when for when, part in client.asks if part.kind == Kind.RECORD}
-    entered = made.time[np.argmax(made.cell == 1)]
+    when = {part.number: when for when, part in client.asks if part.kind == FileKind.RECORD}
+    entered = made.track.time[np.argmax(made.track.cell == 1)]
     assert when[1] == pytest.approx(entered, abs=1e-9)
 
 
 def test_the_cell_comes_before_what_it_sees_and_that_before_levels() -> None:
     """On one connection; what already waits comes sooner once the walker is there."""
     made = row_of_rooms()
-    link = Link(Conditions(20e3, latency=0.0, overhead=0, connections=1))
+    link = FluidLink(Conditions(20e3, latency=0.0, overhead=0, connections=1))
     client = Watched(made, link, 1000)
     while client.cell < 0:
         while done := link.advance(link.now + 0.1):
             client.arrived(done)
         client.look(0)
         client.fetch()
-    client.look(int(np.argmax(made.cell == 2)))
+    client.look(int(np.argmax(made.track.cell == 2)))
     client.fetch()
     kinds = [part.kind for _, part in client.asks]
-    assert kinds[:3] == [Kind.INDEX, Kind.RECORD, Kind.GEOMETRY]
+    assert kinds[:3] == [FileKind.INDEX, FileKind.RECORD, FileKind.GEOMETRY]
     waiting = {request.tag: request.priority for request in client.waiting}
     size = int(made.catalogue.geometry_bytes[0])
-    near, far = (Range(Kind.GEOMETRY, cell, 0, size) for cell in (1, 2))
+    near, far = (Range(FileKind.GEOMETRY, cell, 0, size) for cell in (1, 2))
     assert waiting[far] > waiting[near]
 
 
@@ -363,6 +365,6 @@ def test_who_enters_a_cell_drops_what_it_cannot_see() -> None:
     made = world(stock, eye, np.tile([-1.0, 0.0, 0.0], (100, 1)))
     run, _ = played(made, bare(None), 10_000)
     for f in range(100):
-        unseen = np.setdiff1d(np.arange(5), stock.in_sight[made.cell[f]])
+        unseen = np.setdiff1d(np.arange(5), stock.in_sight[made.track.cell[f]])
         assert not run.column[f, unseen].any()
     assert run.column.max(axis=0).tolist() == [2] * 5

@@ -17,7 +17,7 @@ from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.errors import InputError
 from ptmtools.scene import Scene, ingest
 from ptmtools.walk import Walk, parse_walk, walk_text
-from ptmtools_lab.path.ground import GRID, Ground, Obstacles, grid_points, over_floors
+from ptmtools_lab.path.ground import GRID, WalkGround, WalkObstacles, grid_points, over_floors
 from ptmtools_lab.path.making import Path as Made, make_path
 from ptmtools_lab.path.options import PathOptions
 from tests.cells.buildings import BuildingCase as Building
@@ -163,7 +163,7 @@ def test_furniture_is_walked_around(subject: Subjects) -> None:
 def test_the_foot_is_on_what_is_there(subject: Subjects) -> None:
     """The eye region's floor is wider than the bench; beside it he stands on the floor."""
     scene, cells = subject("furnished")
-    ground = over_floors(cells, Obstacles(scene, cells), 1.6)
+    ground = over_floors(cells, WalkObstacles(scene, cells), 1.6)
     bench = tuple(FURNISHED.in_world(scene, BENCH))
     on, about = above(bench, ground.eye), above(bench, ground.eye, cells.walker.radius)
     low = FURNISHED.in_world(scene, [(0, 0, 0)])[0, 1]
@@ -182,7 +182,7 @@ def test_pictures_are_looked_at(subject: Subjects) -> None:
     still = np.append(speeds(walk), 0) + np.radians(np.append(turns(walk), 0)) < 1e-3
     still[-1] = False
     assert still.sum() / 20 > 3 * made.stops, "seconds"
-    met, far = Obstacles(scene, cells).first(walk.eye[still], walk.direction[still])
+    met, far = WalkObstacles(scene, cells).first(walk.eye[still], walk.direction[still])
     image = np.array([material.image for material in scene.materials])
     assert (image[scene.triangle_material[met]] >= 0).all()
     assert ((far > 0.7) & (far < 3.3)).mean() > 0.9
@@ -378,7 +378,7 @@ def test_points_of_a_grid_over_triangles() -> None:
     np.testing.assert_allclose(point[:, [0, 2]], GRID * column + shift, atol=1e-12)
 
 
-def random_ground(seed: int, count: int = 60) -> tuple[Ground, Floats]:
+def random_ground(seed: int, count: int = 60) -> tuple[WalkGround, Floats]:
     """A graph in two parts or more, and its (n, n) matrix of costs."""
     random = np.random.default_rng(seed)
     one, other = np.triu_indices(count, 1)
@@ -389,7 +389,7 @@ def random_ground(seed: int, count: int = 60) -> tuple[Ground, Floats]:
     matrix[steps[:, 0], steps[:, 1]] = matrix[steps[:, 1], steps[:, 0]] = cost
     np.fill_diagonal(matrix, 0)
     cell = np.arange(count) % 7
-    return Ground.of(np.zeros((count, 3)), cell, np.ones(count), steps, cost), matrix
+    return WalkGround.of(np.zeros((count, 3)), cell, np.ones(count), steps, cost), matrix
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -416,7 +416,7 @@ def test_the_main_part() -> None:
     eye = np.arange(15.0).reshape(5, 3)
     steps = np.array([[0, 2], [2, 4], [1, 3]])
     cell = np.array([0, 1, 0, 2, 0])
-    ground = Ground.of(eye, cell, np.ones(5), steps, np.array([1.0, 2.0, 3.0]))
+    ground = WalkGround.of(eye, cell, np.ones(5), steps, np.array([1.0, 2.0, 3.0]))
     main = ground.main_part(np.array([True, True, True]))
     np.testing.assert_array_equal(main.eye, eye[[1, 3]])
     np.testing.assert_array_equal(main.target, [1, 0])

@@ -19,7 +19,7 @@ from ptmtools.rendering.records import Pyramids
 from ptmtools_lab import measures as flips
 from ptmtools_lab.comparing import SimulateOptions, play
 from ptmtools_lab.figures import frames, strip
-from ptmtools_lab.renderer import Renderer
+from ptmtools_lab.renderer import FrameRenderer
 from ptmtools_lab.world import World
 
 #: Corners of a texture, clockwise from the upper left.
@@ -67,7 +67,7 @@ def card() -> Any:
 
 
 def test_a_texture_is_the_right_way_up(card: Any) -> None:
-    renderer = Renderer(card, 40)
+    renderer = FrameRenderer(card, 40)
     sight = renderer.look(np.zeros(3), np.array([0.0, 0, -1]))
     full = renderer.full(sight)
     assert full.shape == (40, 80, 3)
@@ -85,16 +85,16 @@ def test_a_texture_is_the_right_way_up(card: Any) -> None:
 
 def test_pictures_and_tables_agree(world: World) -> None:
     """With the same pixels, to the last digits that the tables keep."""
-    renderer = Renderer(world, world.camera.height, samples=1)
+    renderer = FrameRenderer(world, world.camera.height, samples=1)
     assert renderer.width == world.camera.width
     stock, views = world.catalogue, world.views
     random = np.random.default_rng(1)
     for f in range(0, world.frames, 9):
-        sight = renderer.look(world.eye[f], world.direction[f])
+        sight = renderer.look(world.track.eye[f], world.track.direction[f])
         column = random.integers(0, stock.levels + 1)
         there = random.random(stock.cell_count) < 0.8
         apart = renderer.colors(sight, there, column) - renderer.full(sight)
-        rows = range(len(views.error))[views.rows(int(world.view[f]))]
+        rows = range(len(views.error))[views.rows(int(world.track.view[f]))]
         expected = sum(
             float(views.error[r, 0])
             if not there[views.cell[r]]
@@ -112,11 +112,11 @@ def test_large_pictures_say_what_tables_do(world: World) -> None:
         {"walk": world}, SimulateOptions(policy="paper", bandwidth="56k", memory="10%")
     )
     run = played.run
-    renderer = Renderer(world, 270)
+    renderer = FrameRenderer(world, 270)
     some = range(5, world.frames, 12)
     drawn = []
     for f in some:
-        sight = renderer.look(world.eye[f], world.direction[f])
+        sight = renderer.look(world.track.eye[f], world.track.direction[f])
         apart = renderer.colors(sight, run.loaded[f], run.column[f]) - renderer.full(sight)
         drawn.append(np.sqrt((apart**2).mean(axis=2)).mean())
     table = run.error[list(some)]

@@ -30,14 +30,14 @@ from ptmtools.texture import decode, encode, read_header
 from ptmtools.walk import read_walk
 from ptmtools_lab.allocation import next_fetch, offered
 from ptmtools_lab.catalogue import catalogue_of
-from ptmtools_lab.client import Client, Kind
-from ptmtools_lab.network import Link
+from ptmtools_lab.client import Client, FileKind
+from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.policies.oracle import _drops
+from ptmtools_lab.policies.engine import _drops
 from ptmtools_lab.previews import Previews, previews_of
-from ptmtools_lab.renderer import Renderer
-from ptmtools_lab.simulation import Run, simulate
-from ptmtools_lab.tables import look
+from ptmtools_lab.renderer import FrameRenderer
+from ptmtools_lab.simulation import WalkRun, simulate
+from ptmtools_lab.tables import Drawing, look
 from ptmtools_lab.world import World, prepare
 from tests.lab.test_forms import pose
 from tests.lab.test_view import CAMERA, room
@@ -209,7 +209,8 @@ def test_at_rest_all_is_exact(policy: str, seed: int) -> None:
     """With time and memory, whatever previews there are; and the budget holds."""
     world = any_world(seed, previews=True)
     assume(len(world.catalogue.previews.texture))
-    world = replace(world.standing(60.0), still=np.ones(301, np.bool_))
+    world = world.standing(60.0)
+    world = replace(world, track=replace(world.track, still=np.ones(301, np.bool_)))
     client, run = watched(world, policy, Conditions(1e6, 0.02), 1 << 30)
     stock = client.world.catalogue
     wants = client.sight(1) > 0 if policy == "best" else np.zeros(stock.ends.shape, np.bool_)  # type: ignore[attr-defined]
@@ -226,11 +227,13 @@ def test_at_rest_all_is_exact(policy: str, seed: int) -> None:
     assert small.overruns == 0
 
 
-def watched(world: World, policy: str, conditions: Conditions, budget: int) -> tuple[Client, Run]:
+def watched(
+    world: World, policy: str, conditions: Conditions, budget: int
+) -> tuple[Client, WalkRun]:
     """The client of a run, afterwards, and the run."""
     clients: list[Client] = []
 
-    def client(world: World, link: Link, budget: int) -> Client:
+    def client(world: World, link: FluidLink, budget: int) -> Client:
         clients.append(POLICIES[policy].client(world, link, budget))
         return clients[0]
 
@@ -339,7 +342,9 @@ def test_errors_of_states_against_pictures_as_a_form(seed: int) -> None:
     made, eyes = room(random), pose(random)
     lossy = lossy_of(made, random)
     shows = pictures(made.pyramids, lossy)
-    views, form = look(made.surfaces, made.pyramids, CAMERA, *eyes, lossy=lossy, forms=[shows])
+    views, form = look(
+        made.surfaces, made.pyramids, CAMERA, *eyes, drawing=Drawing(lossy, {"": shows})
+    )
     (bare,) = look(made.surfaces, made.pyramids, CAMERA, *eyes)
     for name in ("start", "cell", "texture", "need", "sight"):
         assert getattr(views, name).tobytes() == getattr(bare, name).tobytes(), name
@@ -412,13 +417,13 @@ def test_pictures_of_a_database(copy: Path, walk_file: Path) -> None:
                 height, width = below.shape[:2]
                 blocks = above[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3)
                 assert (below == blocks.sum(axis=(1, 3), dtype=np.int64) // 4).all()
-    world = prepare(served, read_walk(walk_file), lossy=lossy)
+    world = prepare(served, read_walk(walk_file), drawing=Drawing(lossy))
     run = simulate(world, POLICIES["best"], Conditions(2e5), 1 << 24)
     differs = np.flatnonzero((run.state != run.column).any(axis=1))
     assert len(differs)
-    renderer = Renderer(world, world.camera.height, samples=1)
+    renderer = FrameRenderer(world, world.camera.height, samples=1)
     f = int(differs[len(differs) // 2])
-    sight = renderer.look(world.eye[f], world.direction[f])
+    sight = renderer.look(world.track.eye[f], world.track.direction[f])
     apart = renderer.colors(sight, run.loaded[f], run.state[f]) - renderer.full(sight)
     e = float(np.sqrt(np.square(apart).mean(axis=2)).mean())
     assert run.error[f] == pytest.approx(e, rel=1e-4)
@@ -480,7 +485,7 @@ def test_levels_that_exist_as_previews_only(copy: Path, walk_file: Path, exact: 
         texels = np.cumsum(pyramids.size[t, : last + 1].prod(axis=1))
         channels = 1 if row.get("light") is not None else 4
         assert (stock.memory[t, 1 : last + 2] == channels * texels).all()
-    world = prepare(served, read_walk(walk_file), pyramids, lossy=lossy)
+    world = prepare(served, read_walk(walk_file), pyramids, drawing=Drawing(lossy))
     client, run = watched(world, "best", Conditions(1e7), 1 << 26)
     # Coarse levels of other previews differ from those of the `.ptm`.
     assert run.error[-1] == pytest.approx(0, abs=1e-6 if exact else 0.3)
@@ -520,5 +525,5 @@ def test_bytes_of_previews(copy: Path, walk_file: Path) -> None:
     assert client.previews.whole.any()
     loaded = sum(int(files.loaded.sum()) for files in client.files.values())
     assert loaded <= run.body <= loaded + sum(request.size for request in client.waiting)
-    assert client.files[Kind.PREVIEW].size.tolist() == stock.previews.bytes.tolist()
+    assert client.files[FileKind.PREVIEW].size.tolist() == stock.previews.bytes.tolist()
     assert 0 < run.useful <= run.body - run.documents

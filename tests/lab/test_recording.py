@@ -15,9 +15,10 @@ from hypothesis import given
 from ptmtools.errors import InputError
 from ptmtools.link import Conditions
 from ptmtools.walk import Waits, Walk, parse_walk
-from ptmtools_lab.client import Client, Kind
+from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.simulation import simulate
+from ptmtools_lab.track import Track
 from ptmtools_lab.world import World, prepare
 from tests.lab.test_previews import watched
 from tests.lab.worlds import SEEDS, any_world
@@ -26,7 +27,7 @@ from tests.lab.worlds import SEEDS, any_world
 BEGUN = 1.5
 
 
-def document(walk: Walk | World, cells: int, **changes: Any) -> dict[str, Any]:
+def document(walk: Walk | Track, cells: int, **changes: Any) -> dict[str, Any]:
     """A walk as a page records it: of each frame that which the one before had drawn."""
     time = (walk.time - walk.time[0]).tolist()
     rows = np.column_stack([time, walk.eye, walk.direction]).tolist()
@@ -83,14 +84,14 @@ def test_what_is_refused(changes: dict[str, Any], code: str) -> None:
 
 def test_a_walk_is_walked_at_its_own_pace(world: World) -> None:
     """As fine as the screen was, with the sizes that the site had, from navigation on."""
-    walk = parsed(document(world, world.catalogue.cell_count))
+    walk = parsed(document(world.track, world.catalogue.cell_count))
     replayed = prepare(world.served, walk, world.pyramids)
-    np.testing.assert_allclose(replayed.time, world.time + BEGUN)
+    np.testing.assert_allclose(replayed.track.time, world.track.time + BEGUN)
     assert replayed.camera.lines == 240
     assert (replayed.camera.width // 2, replayed.camera.height // 2) == (69, 52)
     assert set(replayed.catalogue.record_bytes.tolist()) == {400}
-    assert replayed.drawn is not None
-    assert replayed.drawn.tolist() == [-1, *range(1, world.frames)]
+    assert replayed.track.drawn is not None
+    assert replayed.track.drawn.tolist() == [-1, *range(1, world.frames)]
     run = simulate(replayed, POLICIES["best"], Conditions(512e3), 1 << 20)
     assert run.requests > 5
     assert run.overruns == 0
@@ -106,7 +107,7 @@ def test_previews_that_a_page_preloads(world: World) -> None:
     files = [[0.01, "page", 0, 3000], [0.3, "index", 0, 2000], [0.3, "preview", 0, 700]]
     count = len(world.catalogue.previews.texture)
     assert count
-    walk = parsed(document(world, world.catalogue.cell_count, files=files))
+    walk = parsed(document(world.track, world.catalogue.cell_count, files=files))
     replayed = prepare(world.served, walk, world.pyramids)
     for policy in ("best", "best-exact"):
         client, _ = watched(replayed, policy, Conditions(5e4), 1 << 20)
@@ -115,13 +116,13 @@ def test_previews_that_a_page_preloads(world: World) -> None:
         assert size[:1].tolist() == [700] * (policy == "best")
     assert replayed.catalogue.previews.bytes[0] != 700
     files[2][2] = count
-    walk = parsed(document(world, world.catalogue.cell_count, files=files))
+    walk = parsed(document(world.track, world.catalogue.cell_count, files=files))
     with pytest.raises(InputError, match="PTM-I700"):
         prepare(world.served, walk, world.pyramids)
 
 
 def test_another_database_is_refused(world: World) -> None:
-    walk = parsed(document(world, world.catalogue.cell_count + 1))
+    walk = parsed(document(world.track, world.catalogue.cell_count + 1))
     with pytest.raises(InputError, match="PTM-I700"):
         prepare(world.served, walk, world.pyramids)
 
@@ -136,10 +137,10 @@ def test_one_range_of_a_file_at_a_time(seed: int) -> None:
             made = POLICIES["best"].client(*given)
             ask = made.ask
 
-            def asked(kind: Kind, number: int, end: int, priority: float) -> None:
+            def asked(kind: FileKind, number: int, end: int, priority: float) -> None:
                 ask(kind, number, end, priority)
                 tags: Any = [request.tag for request in made.waiting]
-                count = Counter(tag.number for tag in tags if tag.kind == Kind.TEXTURE)
+                count = Counter(tag.number for tag in tags if tag.kind == FileKind.TEXTURE)
                 most[apart] = max(most[apart], *count.values(), 0)
 
             vars(made).update(ask=asked)

@@ -23,14 +23,15 @@ from ptmtools.rendering.light import AMBIENT, lamps, with_lamp
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import RayCamera
 from ptmtools.walk import read_walk
-from ptmtools_lab.client import Client, Kind, Range
+from ptmtools_lab.client import Client, FileKind, Range
 from ptmtools_lab.comparing import SimulateOptions, budget_of, play, require_hints
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES, PolicyEntry
 from ptmtools_lab.policies.apo import ApoClient
-from ptmtools_lab.relief.stock import without_octrees
-from ptmtools_lab.renderer import Renderer
-from ptmtools_lab.simulation import Run, simulate
+from ptmtools_lab.relief import without_octrees
+from ptmtools_lab.renderer import FrameRenderer
+from ptmtools_lab.simulation import WalkRun, simulate
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare, relief_of
 from ptmtools_systems.apo.lighting import descend, lamp, stop_of
 from ptmtools_systems.apo.served_octrees import Octrees, no_octrees, read_octrees
@@ -63,7 +64,7 @@ def world_of(folder: Path, *, against: bool = False, rate: float = 1.0) -> World
     pyramids = read_pyramids(served)
     relief = relief_of(served, pyramids, plain if against else None)
     walk = read_walk(folder / "walk.json")
-    return prepare(served, walk, pyramids, rate=rate, relief=relief)
+    return prepare(served, walk, pyramids, rate=rate, drawing=Drawing(relief=relief))
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,7 @@ def test_a_flat_triangle_is_lit_by_its_normal(numbers: list[float]) -> None:
 def test_nodes_stop_where_they_are_pixels(world: World) -> None:
     """By the places that pixels of the screen show, not by the formula."""
     camera = replace(world.camera, width=1920, height=1080)
-    renderer = Renderer(world, 8, 1)
+    renderer = FrameRenderer(world, 8, 1)
     surfaces, relief = world.served.surfaces, world.relief
     assert relief
     origin = np.array(world.served.index["origin"])
@@ -148,9 +149,9 @@ def test_nodes_stop_where_they_are_pixels(world: World) -> None:
 
 def direct(world: World, frame: int, columns: Ints) -> float:
     """e by drawing the pixels of the tables: what is shown, and what should be."""
-    renderer = Renderer(world, world.camera.height, 1)
+    renderer = FrameRenderer(world, world.camera.height, 1)
     renderer._camera = world.camera
-    sight = renderer.look(world.eye[frame], world.direction[frame])
+    sight = renderer.look(world.track.eye[frame], world.track.direction[frame])
     renderer.width = world.camera.width
     there = np.ones(world.catalogue.cell_count, dtype=np.bool_)
     shown, full = renderer.colors(sight, there, columns), renderer.full(sight)
@@ -160,7 +161,7 @@ def direct(world: World, frame: int, columns: Ints) -> float:
 def tabled(world: World, frame: int, columns: Ints) -> float:
     """The same by the tables."""
     views = world.views
-    rows = views.rows(int(world.view[frame]))
+    rows = views.rows(int(world.track.view[frame]))
     total = 0.0
     for r in range(rows.start, rows.stop):
         t = int(views.texture[r])
@@ -206,7 +207,7 @@ def test_a_database_compared_with_itself(made: Path) -> None:
     pyramids, walk = read_pyramids(served), read_walk(made / "walk.json")
     alone = prepare(served, walk, pyramids, rate=0.5)
     relief = relief_of(served, pyramids, served)
-    same = prepare(served, walk, pyramids, rate=0.5, relief=relief)
+    same = prepare(served, walk, pyramids, rate=0.5, drawing=Drawing(relief=relief))
     for name in ("start", "cell", "texture", "error", "square", "need", "sight"):
         assert np.array_equal(getattr(alone.views, name), getattr(same.views, name)), name
 
@@ -236,11 +237,11 @@ def test_each_statue_has_its_octree(world: World) -> None:
     assert no_octrees(surfaces).number == 0
 
 
-def walked(world: World, budget: int, seconds: float = 30) -> tuple[Run, list[Range]]:
+def walked(world: World, budget: int, seconds: float = 30) -> tuple[WalkRun, list[Range]]:
     """Who stands there; and the ranges asked for, in that order."""
     asked: list[Range] = []
 
-    def make(world: World, link: Link, budget: int) -> Client:
+    def make(world: World, link: FluidLink, budget: int) -> Client:
         ask = link.request
 
         def request(size: int, priority: float, tag: Any, *more: Any) -> Request:
@@ -264,7 +265,8 @@ def seen_from(world: World, eye: tuple[float, ...], at: tuple[float, ...]) -> Wo
     def change(w: World) -> World:
         place = (eye - origin)[None]
         cell = w.served.locator.along(place)
-        return replace(w, eye=place, direction=direction[None], cell=cell, view=w.view[:1])
+        track = w.track.looking(slice(1))
+        return replace(w, track=replace(track, eye=place, direction=direction[None], cell=cell))
 
     return world.changed(change)
 
@@ -275,7 +277,7 @@ def levels_asked(world: World, asked: list[Range]) -> dict[str, int]:
     first, ends = len(own.pyramids.levels), own.catalogue.ends
     actual = {}
     for o, row in enumerate(own.served.index["octrees"]):
-        mine = [a.end for a in asked if a.kind == Kind.TEXTURE and a.number == first + o]
+        mine = [a.end for a in asked if a.kind == FileKind.TEXTURE and a.number == first + o]
         levels = own.catalogue.levels[first + o]
         last = max(mine, default=0)
         assert last in ends[first + o]
@@ -288,7 +290,7 @@ def test_levels_come_one_after_the_other_until_nodes_are_pixels(world: World) ->
     middle = (foot[0], 0.6, foot[2])
     near, asked = walked(seen_from(world, (2.3, 0.7, 1.2), middle), 1 << 30)
     first = len(world.pyramids.levels)
-    octrees = [a for a in asked if a.kind == Kind.TEXTURE and a.number >= first]
+    octrees = [a for a in asked if a.kind == FileKind.TEXTURE and a.number >= first]
     assert [a.begin for a in octrees] == [0, *[a.end for a in octrees[:-1]]]
     actual = levels_asked(world, asked)
     assert world.relief
@@ -353,11 +355,12 @@ def prepare_views(world: World) -> World:
     from ptmtools_lab.tables import look
 
     (views,) = look(
-        world.served.surfaces, world.pyramids, world.camera, world.eye, world.direction,
-        relief=world.relief,
+        world.served.surfaces, world.pyramids, world.camera, world.track.eye, world.track.direction,
+        drawing=Drawing(relief=world.relief),
     )  # fmt: skip
-    view = np.zeros(len(world.view), np.int64)
-    return replace(world, views=views, view=view, other_forms={}).standing(20)
+    view = np.zeros(len(world.track.view), np.int64)
+    track = replace(world.track, view=view)
+    return replace(world, views=views, track=track, other_forms={}).standing(20)
 
 
 @pytest.mark.parametrize("levels", [1, 3, 12])

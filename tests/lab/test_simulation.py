@@ -13,13 +13,12 @@ from hypothesis import Phase, given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.link import Conditions
-from ptmtools_lab.client import Client, Kind, Range
-from ptmtools_lab.network import Link, Request
-from ptmtools_lab.opening import opening_of
+from ptmtools_lab.client import Client, FileKind, Range
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.whole_files import LruClient
-from ptmtools_lab.simulation import Run, simulate
-from ptmtools_lab.world import World
+from ptmtools_lab.simulation import WalkRun, simulate
+from ptmtools_lab.world import World, opening_of
 from tests.lab.links import CONDITIONS
 from tests.lab.worlds import SEEDS, any_world, catalogue, for_policy, raw, standing
 
@@ -44,7 +43,7 @@ class Witness:
         )
 
     def _watched(self, policy: str) -> Any:
-        def make(world: World, link: Link, budget: int) -> Client:
+        def make(world: World, link: FluidLink, budget: int) -> Client:
             self.client, self.link = POLICIES[policy].client(world, link, budget), link
             ask, look = link.request, self.client.look
 
@@ -75,16 +74,16 @@ class Witness:
 
     def _check(self, frame: int) -> None:
         stock, client = self.world.catalogue, self.client
-        assert self.link.now == self.world.time[frame]
+        assert self.link.now == self.world.track.time[frame]
         self.frames += 1
         each = np.arange(stock.texture_count)
         assert (client.column <= stock.levels).all()
-        assert (stock.ends[each, client.column] <= self._sent(Kind.TEXTURE, len(each))).all()
+        assert (stock.ends[each, client.column] <= self._sent(FileKind.TEXTURE, len(each))).all()
         cells = np.arange(stock.cell_count)
-        whole = self._sent(Kind.GEOMETRY, len(cells)) >= stock.geometry_bytes
+        whole = self._sent(FileKind.GEOMETRY, len(cells)) >= stock.geometry_bytes
         assert (client.geometry.whole == whole).all()
 
-    def _sent(self, kind: Kind, count: int) -> Ints:
+    def _sent(self, kind: FileKind, count: int) -> Ints:
         """(n,) bytes of each file that came without a gap."""
         there = np.zeros(count, np.int64)
         parts = [r for r in self.asked if isinstance(r.tag, Range) and r.tag.kind == kind]
@@ -130,7 +129,7 @@ def test_what_no_client_may_do(policy: str, seed: int, conditions: Conditions, b
         assert (share <= 1 + 1e-6).all()
 
 
-def _check_changes(run: Run, world: World) -> None:
+def _check_changes(run: WalkRun, world: World) -> None:
     """Levels that come are uploaded, those that go cost nothing."""
     uploads = switches = 0
     for memory, columns in zip(world.catalogue.memory, run.column.T.tolist(), strict=True):
@@ -138,12 +137,12 @@ def _check_changes(run: Run, world: World) -> None:
             uploads += int(memory[max(before, after)] - memory[before])
             switches += before != after
     assert (run.uploads, run.switches) == (uploads, switches)
-    assert run.stalls == sum(not run.loaded[f, c] for f, c in enumerate(world.cell.tolist()))
+    assert run.stalls == sum(not run.loaded[f, c] for f, c in enumerate(world.track.cell.tolist()))
 
 
 def _check_once(seen: Witness) -> None:
     """Each byte is asked for once."""
-    ranges: dict[tuple[Kind, int], list[tuple[int, int]]] = {}
+    ranges: dict[tuple[FileKind, int], list[tuple[int, int]]] = {}
     for request in seen.asked:
         part = request.tag
         assert isinstance(part, Range)
@@ -155,8 +154,8 @@ def _check_once(seen: Witness) -> None:
         assert all(a[1] <= b[0] for a, b in itertools.pairwise(parts))
 
 
-def same(a: Run, b: Run) -> bool:
-    values = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(Run)]
+def same(a: WalkRun, b: WalkRun) -> bool:
+    values = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(WalkRun)]
     return all(
         x.tobytes() == y.tobytes() if isinstance(x, np.ndarray) else x == y for x, y in values
     )
@@ -270,7 +269,9 @@ def test_who_stands_sees_no_worse(seed: int) -> None:
 
 def of_nothing(world: World) -> Floats:
     """(F,) the error of each frame with nothing there."""
-    return np.array([world.views.error[world.views.rows(int(v)), 0].sum() for v in world.view])
+    return np.array(
+        [world.views.error[world.views.rows(int(v)), 0].sum() for v in world.track.view]
+    )
 
 
 def test_an_opening_brings_the_first_view_after_one_latency() -> None:

@@ -1,7 +1,7 @@
 """Worlds made by hand, without files: rooms in a row along x, and somebody who walks through them.
 
-What is on the screen is made up, but by the rules of `Views`: only what reaches into the frustum,
-an error that falls with each level, none with the finest that is wanted.
+What is on the screen is made up, but by the rules of `WalkViews`: only what reaches into the
+frustum, an error that falls with each level, none with the finest that is wanted.
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ from hypothesis import strategies as st
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.rays import Frustum, RayCamera
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
-from ptmtools_lab.catalogue import Catalogue, Shapes
-from ptmtools_lab.meshes import Meshes, meshes_of
-from ptmtools_lab.opening import Parts
+from ptmtools_lab.catalogue import Catalogue, Meshes, Shapes, meshes_of
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.previews import previews_of
-from ptmtools_lab.tables import Views
-from ptmtools_lab.world import STILL_SECONDS, World
+from ptmtools_lab.tables import WalkViews
+from ptmtools_lab.track import STILL_SECONDS, Track
+from ptmtools_lab.world import Parts, World
 
 #: Metres of a room along x, up and along z.
 ROOM = np.array([4.0, 3.0, 4.0])
@@ -177,14 +176,16 @@ def world(
         lossy=None,  # type: ignore[arg-type]
         catalogue=stock,
         views=_views(stock, eye, direction, cell, random),
-        view=np.arange(frames),
         camera=CAMERA,
-        time=time,
-        eye=eye,
-        direction=direction,
-        cell=cell,
-        still=_still(np.hstack([eye, direction])),
-        rate=RATE,
+        track=Track(
+            time=time,
+            eye=eye,
+            direction=direction,
+            cell=cell,
+            still=_still(np.hstack([eye, direction])),
+            view=np.arange(frames),
+            rate=RATE,
+        ),
     )
 
 
@@ -196,7 +197,7 @@ def _still(pose: Floats) -> Bools:
 
 def _views(
     stock: Catalogue, eye: Floats, direction: Floats, cell: Ints, random: np.random.Generator | None
-) -> Views:
+) -> WalkViews:
     shapes, deepest, previews = stock.shapes, stock.ends.shape[1] - 1, stock.previews
     states = max(deepest, int((previews.state + previews.column).max(initial=0)))
     wide = (states + 2, states + 2, deepest, deepest)
@@ -226,7 +227,7 @@ def _views(
     pixels = (len(eye), int(CAMERA.sparse.sum()))
     owner = np.tile(cell.astype(np.int32)[:, None], pixels[1])
     depth = np.full(pixels, 1.5, np.float32)
-    return Views(np.array(start), of[:, 0].copy(), of[:, 1].copy(), *rows, owner, depth)
+    return WalkViews(np.array(start), of[:, 0].copy(), of[:, 1].copy(), *rows, owner, depth)
 
 
 def _row(
@@ -318,7 +319,7 @@ def any_world(
     eye = np.stack([x, np.full(frames, 1.6), np.full(frames, 2.0)], axis=1)
     direction = np.stack([np.cos(yaw), np.zeros(frames), np.sin(yaw)], axis=1)
     walked = world(stock, eye, direction, random)
-    return replace(walked, opening=_any_opening(random, stock, int(walked.cell[0])))
+    return replace(walked, opening=_any_opening(random, stock, int(walked.track.cell[0])))
 
 
 def _any_meshes(random: np.random.Generator, cells: int) -> Meshes:

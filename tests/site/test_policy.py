@@ -18,8 +18,8 @@ from ptmtools.site.client import PRIOR_BANDWIDTH, PRIOR_LATENCY
 from ptmtools_lab.allocation import allocate, next_fetch
 from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.client import Estimate
-from ptmtools_lab.network import Link, Request
-from ptmtools_lab.policies.paper_kernels import refresh, share_out
+from ptmtools_lab.network import FluidLink, Request
+from ptmtools_lab.policies.paper import refresh, share_out
 from ptmtools_lab.previews import Previews, previews_of
 from ptmtools_lab.world import World
 from tests.lab.conftest import two_rooms, walk_file, world
@@ -160,7 +160,7 @@ def test_what_is_believed_of_a_link(
     """As Python's, of the same arrivals, though a browser knows of more moments."""
     random = np.random.default_rng(seed)
     latency = float(random.uniform(0.01, 0.3))
-    link = Link(Conditions(float(random.uniform(2e4, 2e7)), latency, protocol=protocol))
+    link = FluidLink(Conditions(float(random.uniform(2e4, 2e7)), latency, protocol=protocol))
     estimate, calls, expected = Estimate(link, PRIOR_BANDWIDTH, PRIOR_LATENCY), [], []
     asked: list[Request] = []
     begun: set[int] = set()

@@ -28,6 +28,7 @@ from ptmtools.site.throttle import Throttle
 from ptmtools.walk import parse_walk
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.simulation import simulate
+from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import prepare, read_forms
 from ptmtools_systems.interlace import deinterlace
 from tests.scene.bumpy import write_bumpy
@@ -263,7 +264,8 @@ def test_a_recording_replays(visit: Visiting, hall: Site, hall_db: Path) -> None
     assert walk.browser.policy == "gpuii"
     served = read_served(hall_db)
     pyramids = read_pyramids(served)
-    world = prepare(served, walk, pyramids, forms=read_forms(served, pyramids, ["interlaced"]))
+    forms = read_forms(served, pyramids, ["interlaced"])
+    world = prepare(served, walk, pyramids, drawing=Drawing(forms=forms))
     conditions = Conditions(link.bandwidth, link.latency)
     run = simulate(world, POLICIES["gpuii"], conditions, walk.browser.budget)
     own = [v for v in asked if "/sets-" not in v.path]

@@ -16,7 +16,7 @@ from ptmtools.errors import InputError
 from ptmtools.link import Conditions
 from ptmtools.site import throttle
 from ptmtools.site.throttle import LATE, PIECE, Paced, SharedLink, Throttle, Visits
-from ptmtools_lab.network import Link as FluidLink
+from ptmtools_lab.network import FluidLink
 
 if TYPE_CHECKING:
     from starlette.types import Message, Receive, Scope, Send

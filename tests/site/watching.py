@@ -14,10 +14,9 @@ import numpy as np
 from ptmtools.link import Conditions
 from ptmtools.site.client import AVERAGING, BEHIND, HELD_ON, NEAREST
 from ptmtools_lab.allocation import allocate
-from ptmtools_lab.catalogue import Catalogue
-from ptmtools_lab.client import Client, Kind
-from ptmtools_lab.meshes import Meshes
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.catalogue import Catalogue, Meshes
+from ptmtools_lab.client import Client, FileKind
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.engine import EngineClient
 from ptmtools_lab.previews import Previews
@@ -45,7 +44,7 @@ class Witness:
     events: list[Event] = field(default_factory=list)
     answers: list[Any] = field(default_factory=list)
 
-    def client(self, world: World, link: Link, budget: int) -> Client:
+    def client(self, world: World, link: FluidLink, budget: int) -> Client:
         """The one that is watched."""
         client = POLICIES[self.policy].client(world, link, budget)
         client.ticks = 1
@@ -55,11 +54,11 @@ class Witness:
 
         def looked(frame: int) -> None:
             look(frame)
-            eye, (x, y, z) = world.eye[frame].tolist(), world.direction[frame].tolist()
+            eye, (x, y, z) = world.track.eye[frame].tolist(), world.track.direction[frame].tolist()
             chosen = [client.column.tolist(), _missing(client)]
             self._note(
-                "look", chosen, now=float(world.time[frame]), eye=eye,
-                cell=int(world.cell[frame]), still=bool(world.still[frame]),
+                "look", chosen, now=float(world.track.time[frame]), eye=eye,
+                cell=int(world.track.cell[frame]), still=bool(world.track.still[frame]),
                 yaw=math.atan2(-x, -z), pitch=math.asin(max(-1.0, min(1.0, y))), **_seen(client),
             )  # fmt: skip
 
@@ -71,7 +70,7 @@ class Witness:
             actual = [request for request in client.waiting if request not in number]
             # Some policies ask for levels when they look; documents are asked for before these.
             actual.sort(key=levels.__contains__)
-            rows = [r for r in actual if r.tag.kind != Kind.INDEX]  # type: ignore[attr-defined]
+            rows = [r for r in actual if r.tag.kind != FileKind.INDEX]  # type: ignore[attr-defined]
             for request in rows:
                 number[request] = len(number)
             if client.index:
@@ -84,7 +83,7 @@ class Witness:
             arrived(request)
             if request in number:
                 part: Any = request.tag
-                seen = {} if part.kind in (Kind.TEXTURE, Kind.PREVIEW) else _seen(client)
+                seen = {} if part.kind in (FileKind.TEXTURE, FileKind.PREVIEW) else _seen(client)
                 self._note("arrived", client.have.tolist(), number=number[request], **seen)
 
         vars(client).update(look=looked, fetch=fetched, arrived=came)
@@ -133,7 +132,7 @@ def _missing(client: Client) -> int | None:
     if not isinstance(client, EngineClient):
         return None
     stock = client.world.catalogue
-    here = int(client.world.cell[client.frame])
+    here = int(client.world.track.cell[client.frame])
     count = int(not client.records.whole[here])
     if client.cell < 0 or client._worth is None:
         return count

@@ -40,8 +40,8 @@ def place(rooms: Path, two_rooms: Path, walk_file: Path) -> CampusWorld:
 
 
 def test_the_same_walk(place: CampusWorld, world: World) -> None:
-    assert np.array_equal(place.time, world.time)
-    assert np.array_equal(place.eye, world.eye)
+    assert np.array_equal(place.time, world.track.time)
+    assert np.array_equal(place.eye, world.track.eye)
     run, measures = measure_campus_walk(place, world, CAMPUS_POLICIES["campus-medium"], SLOW, None)
     options = CampusWalkOptions("medium", "64k", lightmaps=False)
     alone = simulate_campus(place, options.qualities[0], options)
@@ -148,4 +148,4 @@ def test_no_campus_there(
 
 def test_a_recorded_walk(rooms: Path, world: World) -> None:
     with pytest.raises(InputError, match="PTM-I701"):
-        prepare_campus(rooms, parsed(document(world, 2)))
+        prepare_campus(rooms, parsed(document(world.track, 2)))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
-from ptmtools_lab.campus.charts import WINDOW, network, picture
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.simulation import CampusRun, simulate_campus
+from ptmtools_lab.campus_report import WINDOW, network, picture
 from ptmtools_systems.campus.model import PRESETS
 from tests.lab.campus.stocks import RATE, campus, stock, world
 from tests.lab.campus.test_command import walk as walk  # a fixture

@@ -13,7 +13,7 @@ from ptmtools_lab.campus.client import CampusClient
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.simulation import simulate_campus
 from ptmtools_lab.campus.stock import Stock
-from ptmtools_lab.network import Link, Request
+from ptmtools_lab.network import FluidLink, Request
 from ptmtools_systems.campus.model import PRESETS, Quality
 from tests.lab.campus.stocks import (
     APART,
@@ -36,7 +36,7 @@ FIVE = [(0, i + 1) for i in range(5)]
 ONE_THREAD = CampusWalkOptions(nearest=2, threads=1, bandwidth="4M")
 
 
-class Noting(Link):
+class Noting(FluidLink):
     """A link that remembers what it was asked for, and the most that was on the way at once."""
 
     def __init__(self, made: Stock, options: CampusWalkOptions) -> None:

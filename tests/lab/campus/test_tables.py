@@ -1,4 +1,4 @@
-"""Tables of errors against pictures drawn pixel by pixel, in plain Python."""
+"""CampusTables of errors against pictures drawn pixel by pixel, in plain Python."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from ptmtools_lab.campus.world import (
     COARSE,
     FINE,
     NOTHING,
+    CampusTables,
     CampusWorld,
     FullPicture,
-    Tables,
     look,
     prepare_campus,
 )
@@ -162,7 +162,7 @@ def expected(pictures: dict[int, Picture], frame: int, mesh: Ints, column: Ints)
     return total / len(rays)
 
 
-def tables(world: CampusWorld) -> Tables:
+def tables(world: CampusWorld) -> CampusTables:
     assert world.tables is not None
     return world.tables
 

@@ -21,15 +21,18 @@ from ptmtools.texture import EncodeOptions
 from ptmtools_lab.tradeoff import FURTHER
 from ptmtools_lab.tradeoff.experiment import Experiment, Measurement, Setting, decibels
 from ptmtools_lab.tradeoff.forms import (
+    ViewerRays,
+    apart,
     coarse_experiment,
     corners_of,
     interlaced_experiment,
     jpeg_experiment,
     light_experiment,
+    look,
     octree_experiment,
     only,
+    outline,
 )
-from ptmtools_lab.tradeoff.looks import Rays, apart, look, outline
 from ptmtools_lab.tradeoff.stages import textures_experiment
 from ptmtools_systems.campus.objects import parts_of
 from tests.systems.campus.models import level, write_obj
@@ -74,7 +77,7 @@ def measured(experiment: Experiment, *names: str) -> Mapping[str, Measurement]:
 def test_rays_meet_what_is_there() -> None:
     cube = np.array([[x, y, z] for x in (0, 2) for y in (0, 2) for z in (0, 2)], np.float64)
     square = np.array([[0, 1, 3], [0, 3, 2]], np.int32)  # x = 0
-    rays = Rays.around(cube)
+    rays = ViewerRays.around(cube)
     seen = look(rays, cube, square)
     place = (rays.start + seen.distance[:, None] * rays.along)[seen.met]
     assert np.abs(place[:, 0]).max() < 1e-5
@@ -136,7 +139,7 @@ def test_coarse_meshes_against_the_model(scene: Scene) -> None:
 
 
 def test_more_rays_are_nearer_to_the_light(scene: Scene) -> None:
-    experiment = light_experiment(scene, parts_of(scene, 0.0), most=512)
+    experiment = light_experiment(scene, parts_of(scene, 0.0), limit=512)
     rows = measured(experiment, "--samples 1", "--samples 16", "--samples 256")
     one, some, many = (row.error for row in rows.values())
     assert many < some / 2 < one / 4

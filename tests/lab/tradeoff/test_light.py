@@ -19,7 +19,7 @@ pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 
 def test_more_texels_and_rays_are_nearer_to_the_light(two_rooms: Path) -> None:
     artifacts = Artifacts(open_database(two_rooms))
-    experiment = prepare_lightmaps(Subject(artifacts, 1, 1), most=256)
+    experiment = prepare_lightmaps(Subject(artifacts, 1, 1), limit=256)
     tried = {setting.name: setting for setting in experiment.settings}
     names = "samples 4", "samples 64", "density 2.5", "density 10"
     few, many, coarse, fine = (experiment.measure(tried[f"--light-{name}"]) for name in names)

@@ -26,11 +26,11 @@ from ptmtools.walk import Walk, read_walk
 from ptmtools_lab.comparing import play
 from ptmtools_lab.path.making import path_through
 from ptmtools_lab.path.options import PathOptions
-from ptmtools_lab.tables import look
+from ptmtools_lab.tables import Drawing, look
 from ptmtools_lab.tradeoff.experiment import Deadline
 from ptmtools_lab.tradeoff.knobs import (
     KNOBS,
-    Setting,
+    KnobSetting,
     build_again,
     concerned,
     copied,
@@ -213,10 +213,11 @@ def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, 
     assert begins_with(original.pyramids, own)
     assert not begins_with(own, original.pyramids)
     assert own.levels.max() < original.pyramids.levels.max()
-    unique, first = np.unique(original.view, return_index=True)
+    track = original.track
+    unique, first = np.unique(track.view, return_index=True)
     (again,) = look(
-        coarse.surfaces, own, original.camera, original.eye[first], original.direction[first],
-        full=original.pyramids, same_maps=True,
+        coarse.surfaces, own, original.camera, track.eye[first], track.direction[first],
+        drawing=Drawing(full=original.pyramids, same_maps=True),
     )  # fmt: skip
     assert len(unique) == again.frames
     for name in ("start", "cell", "texture"):
@@ -362,7 +363,7 @@ def test_links_and_memory_suit_the_walk(world) -> None:
     memory, received = needs_of(world)
     assert 0 < memory <= world.catalogue.whole
     slow, fast = (link.bandwidth for link in options.links())
-    assert slow == pytest.approx(8 * received / world.time[-1], rel=0.05)
+    assert slow == pytest.approx(8 * received / world.track.time[-1], rel=0.05)
     assert fast == pytest.approx(8 * slow, rel=0.1)
     given = replace(WalkOptions(), bandwidth="512k,4M", memory="10%")
     assert given.for_walk(world) == given
@@ -384,7 +385,7 @@ def test_what_the_time_does_not_allow_is_named(two_rooms, walk_file) -> None:
     assert "of which 0 s are allowed" in told[0]
     assert table(trade)[-1].endswith("(--minutes): --max-side 16, --need 0.")
     names = ["a1", "a2", "a3", "b1", "b2"]
-    some = [Setting(KNOBS[name > "b"], name, "", None) for name in names]
+    some = [KnobSetting(KNOBS[name > "b"], name, "", None) for name in names]
     assert [names[k] for k in by_turns(some)] == ["a1", "b1", "a2", "b2", "a3"]
 
 
