@@ -64,7 +64,7 @@ def test_the_building(tmp_path: Path) -> None:
 def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     added = jit.kernel(lambda x: x + 1)
     monkeypatch.setattr("ptmtools.pipeline.warm_up.warm_building", lambda: added(1))
-    for others in ("images", "statue"):
+    for others in ("images", "objects"):
         monkeypatch.setattr(f"ptmtools.pipeline.warm_up.warm_{others}", lambda: None)
     monkeypatch.setattr(jit, "cache_folder", lambda *_: "")
     for printed in ("compiled in", "nothing to compile"):
