@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.scene.orientation.test_facing import glb
 
 from ptmtools.cells.model import Cells
 from ptmtools.pipeline.build import build_scene
@@ -15,6 +14,7 @@ from ptmtools.pipeline.stages import CELLS
 from ptmtools.scene import IngestOptions
 from tests.e2e.conftest import TWO_ROOMS, Ptm
 from tests.scene.buildings import house, inside_out, obj_text, y_up
+from tests.scene.orientation.test_facing import glb
 
 MODEL = TWO_ROOMS / "two_rooms.obj"
 
