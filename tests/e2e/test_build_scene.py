@@ -215,7 +215,7 @@ def test_a_build_that_was_stopped_is_resumed(
     else:
         assert process.returncode in (0, -signal.SIGKILL)
     report = build(model, db)
-    assert "cells" not in ran(report)
+    assert "scene" not in ran(report)
     assert listing(db) == listing(tmp_path / "whole.db")
 
 

@@ -48,7 +48,8 @@ def run_of(error: list[float], still: list[bool]) -> WalkRun:
 def world() -> Any:
     """Two frames a second, in which e is 8 if nothing is there."""
     views = SimpleNamespace(rows=lambda frame: slice(0, 2), error=np.array([[5.0, 1], [3, 1]]))
-    return SimpleNamespace(rate=2.0, frames=4, view=np.zeros(4, np.int64), views=views)
+    track = SimpleNamespace(rate=2.0, view=np.zeros(4, np.int64))
+    return SimpleNamespace(track=track, frames=4, views=views)
 
 
 RUN = run_of([8, 4, 2, 2], [False, False, True, True])

@@ -15,7 +15,7 @@ import neighbours
 
 
 def world(still: list[int]) -> Any:
-    return SimpleNamespace(still=np.array(still, bool))
+    return SimpleNamespace(track=SimpleNamespace(still=np.array(still, bool)))
 
 
 @pytest.mark.parametrize(
