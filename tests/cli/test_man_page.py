@@ -23,6 +23,7 @@ def page() -> str:
 def test_every_command_and_option_is_there(page: str) -> None:
     sections = dict(re.findall(r"^\.SH (ptm .*)\n((?:(?!\.SH).*\n)*)", page, re.MULTILINE))
     context = click.Context(ptm)
+    below = set()
     for name in ptm.list_commands(context):
         command = ptm.get_command(context, name)
         assert command is not None
@@ -31,7 +32,11 @@ def test_every_command_and_option_is_there(page: str) -> None:
         for option in command.params:
             if isinstance(option, click.Option) and not option.hidden and name != "warm-up":
                 assert option.opts[0].replace("-", r"\-") in text, (name, option.opts)
-    assert {*sections} == {r"ptm tour init", r"ptm tour check"}
+        if isinstance(command, click.Group):
+            names = command.list_commands(click.Context(command))
+            below |= {f"ptm {name} {child}".replace("-", r"\-") for child in names}
+    assert {r"ptm tour init", r"ptm tour check", r"ptm sample museum"} <= below
+    assert {*sections} == below
 
 
 def test_texts_are_no_macros() -> None:
