@@ -217,8 +217,8 @@ def count_names(packages: Packages) -> dict[str, tuple[int, int]]:
     """Functions of each package that are named by a participle, and by a preposition."""
     names = {package: list(function_names(files)) for package, files in packages.items()}
     return {
-        package: (sum(map(is_participle, found)), sum(map(is_preposition, found)))
-        for package, found in names.items()
+        package: (sum(map(is_participle, functions)), sum(map(is_preposition, functions)))
+        for package, functions in names.items()
     }
 
 

@@ -37,7 +37,7 @@ def repeated_classes(files: Iterable[PythonFile]) -> dict[str, list[str]]:
         for node in file.nodes:
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(f"{file.path}:{node.lineno}")
-    return {name: found for name, found in sorted(places.items()) if len(found) > 1}
+    return {name: uses for name, uses in sorted(places.items()) if len(uses) > 1}
 
 
 def is_participle(name: str) -> bool:
@@ -64,7 +64,7 @@ def function_names(files: Iterable[PythonFile]) -> Iterator[str]:
 
 def banned_locals(file: PythonFile) -> list[tuple[int, str]]:
     """Lines and names of banned locals, loop variables and parameters of a file."""
-    found = [
+    assigned = [
         (line, name)
         for node in file.nodes
         for line, name in assigned_names(node)
@@ -79,7 +79,7 @@ def banned_locals(file: PythonFile) -> list[tuple[int, str]]:
         for target in ast.walk(statement)
         if isinstance(target, ast.Name)
     }
-    return sorted(set(found) - fields)
+    return sorted(set(assigned) - fields)
 
 
 def assigned_names(node: ast.AST) -> Iterator[tuple[int, str]]:

@@ -21,7 +21,7 @@ from ptmtools.tolerance import ROUNDING_SHARE
 
 #: A face is a stray beyond this many sizes of the faces around the middle of the model,
 _REACH = 1000.0
-#: which are found from the corners of this many faces.
+#: which come from the corners of this many faces.
 _SAMPLE = 1 << 16
 
 

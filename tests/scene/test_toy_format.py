@@ -31,9 +31,11 @@ def toy(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Mode
     if request.param == "row":
         monkeypatch.setitem(FORMATS, declared.name, declared)
     else:
-        others, found = plugins.declared, {declared.name: declared}
+        others, formats = plugins.declared, {declared.name: declared}
         monkeypatch.setattr(
-            plugins, "declared", lambda kind, cls: found if kind == "formats" else others(kind, cls)
+            plugins,
+            "declared",
+            lambda kind, cls: formats if kind == "formats" else others(kind, cls),
         )
     return declared
 

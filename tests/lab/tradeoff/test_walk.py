@@ -375,14 +375,14 @@ def test_links_and_memory_suit_the_walk(world) -> None:
 @pytest.mark.usefixtures("instant")
 def test_what_the_time_does_not_allow_is_named(two_rooms, walk_file) -> None:
     """The first values of all options are before the second ones."""
-    told: list[str] = []
+    lines: list[str] = []
     trade = try_settings(
         Artifacts(open_database(two_rooms)), read_walk(walk_file), WalkOptions(),
-        ["max-side", "need"], deadline=Deadline(1e-9), tell=told.append,
+        ["max-side", "need"], deadline=Deadline(1e-9), tell=lines.append,
     )  # fmt: skip
     assert [trial.name for trial in trade.trials] == ["--max-side 32"]
     assert trade.untried == ("--max-side 16", "--need 0")
-    assert "of which 0 s are allowed" in told[0]
+    assert "of which 0 s are allowed" in lines[0]
     assert table(trade)[-1].endswith("(--minutes): --max-side 16, --need 0.")
     names = ["a1", "a2", "a3", "b1", "b2"]
     some = [KnobSetting(KNOBS[name > "b"], name, "", None) for name in names]
