@@ -25,7 +25,7 @@ CHUNK = 64
 
 
 def taken_apart(monkeypatch: pytest.MonkeyPatch, scene: Scene, **options: Any) -> tuple[Any, ...]:
-    """What `join_pieces` is given for a scene: pieces of all surfaces, those without an owner too."""
+    """The arguments of `join_pieces` for a scene: all pieces, those without an owner too."""
     given: list[Any] = []
 
     def spy(*arguments: Any) -> Mesh:

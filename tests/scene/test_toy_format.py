@@ -31,11 +31,11 @@ def toy(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Mode
     if request.param == "row":
         monkeypatch.setitem(FORMATS, declared.name, declared)
     else:
-        others, formats = plugins.declared, {declared.name: declared}
+        others, rows = plugins.declared, {declared.name: declared}
         monkeypatch.setattr(
             plugins,
             "declared",
-            lambda kind, cls: formats if kind == "formats" else others(kind, cls),
+            lambda kind, cls: rows if kind == "formats" else others(kind, cls),
         )
     return declared
 
