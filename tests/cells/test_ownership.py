@@ -33,5 +33,5 @@ def test_whole_triangles_end_where_cutting_them_ends(
     def stay(tree, corners, facing, tolerance):
         return np.zeros(len(corners), dtype=np.int64), np.zeros(len(corners), dtype=bool)
 
-    monkeypatch.setattr(ownership, "_settled", stay)
+    monkeypatch.setattr(ownership, "_settle", stay)
     assert rows(subdivide(scene, options)) == rows(compiled)
