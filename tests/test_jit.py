@@ -211,8 +211,8 @@ def test_a_constant_of_this_package(tmp_path: Path) -> None:
         ROOT, tmp_path / "ptmtools", ignore=shutil.ignore_patterns("__pycache__", "schemas")
     )
     program = (
-        "import numpy; from ptmtools.texture.coders.mixing_decisions import counted; "
-        "print(counted(numpy.uint32(1 << 31), 1, 9))"
+        "import numpy; from ptmtools.texture.coders.mixing_decisions import update_counter; "
+        "print(update_counter(numpy.uint32(1 << 31), 1, 9))"
     )
     before = run(program, tmp_path)
     tables = tmp_path / "ptmtools" / "texture/coders/mixing_tables.py"

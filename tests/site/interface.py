@@ -45,7 +45,7 @@ def page_text(script: str = "/fake.mjs") -> str:
         "style": (PAGE / "style.css").read_text(),
         "site": json.dumps(SITE),
         "script": script,
-        "poster": "data/poster.png",
+        "poster": '<img id="poster" src="data/poster.png" alt="">',
     }
     for name, value in filled.items():
         text = text.replace(f"{{{{{name}}}}}", value)

@@ -104,7 +104,7 @@ def test_the_cell_along_a_walk(tmp_path: Path, world: World) -> None:
     middle = (stock.low + stock.high) / 2
     share = np.linspace(0, 1, 37)[:, None]
     ways = [(1 - share) * a + share * b for a, b in itertools.pairwise(middle)]
-    eyes = np.concatenate([world.eye, *ways])
+    eyes = np.concatenate([world.track.eye, *ways])
     actual = located(tmp_path, world, eyes, every)
     cells = [cell for cell, _ in actual]
     assert cells == world.served.locator.along(eyes).tolist()
@@ -155,7 +155,7 @@ def test_the_cells_on_both_sides_of_a_door_leaf(tmp_path: Path) -> None:
 def test_cells_whose_record_is_not_there(tmp_path: Path, world: World) -> None:
     """By their boxes, those next to the cell before first."""
     stock = world.catalogue
-    here = int(world.cell[0])
+    here = int(world.track.cell[0])
     middle = (stock.low + stock.high) / 2
     reported = located(tmp_path, world, middle, [here], here)
     for cell, (_, candidates) in enumerate(reported):
