@@ -50,10 +50,10 @@ from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf import pack
 from ptmtools.output.pieces import pieces_of
 from ptmtools.output.served import on_link
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.encoding import TextureOptions, encoded_texels
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, EMIT, LIGHT, SCENE, TEXTURES
 from ptmtools.pipeline.stages.light import lightmap_files
 from ptmtools.scene import Scene, ingest

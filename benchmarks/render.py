@@ -251,7 +251,7 @@ class Tracer:
 def load(path: Path) -> Scene:
     """The scene of a model file, or of a database."""
     if path.is_dir():
-        from ptmtools.pipeline.stage import Artifacts
+        from ptmtools.pipeline.artifacts import Artifacts
         from ptmtools.pipeline.stages import SCENE
         from ptmtools.store.folder import DatabaseFolder
 

@@ -28,8 +28,8 @@ import numpy as np
 from ptmtools.arrays import Ints
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.quantities import parse_bandwidth, parse_memory
 from ptmtools_lab.comparing import budget_of
 from ptmtools_lab.path.making import path_through

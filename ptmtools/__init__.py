@@ -47,10 +47,10 @@ if TYPE_CHECKING:
         plot_plan as plot_plan,
     )
     from ptmtools.output.served import Served as Served, read_served as read_served
+    from ptmtools.pipeline.artifacts import Artifacts as Artifacts
     from ptmtools.pipeline.build import build_scene as build_scene, run_stage as run_stage
     from ptmtools.pipeline.encoding import TextureOptions as TextureOptions
     from ptmtools.pipeline.report import BuildReport as BuildReport
-    from ptmtools.pipeline.stage import Artifacts as Artifacts
     from ptmtools.pipeline.validation import validate as validate
     from ptmtools.scene import IngestOptions as IngestOptions, Scene as Scene, ingest as ingest
     from ptmtools.site.content import (
@@ -105,7 +105,7 @@ __getattr__ = lazy_exports(
         "ptmtools.pipeline.build": "build_scene run_stage",
         "ptmtools.pipeline.encoding": "TextureOptions",
         "ptmtools.pipeline.report": "BuildReport",
-        "ptmtools.pipeline.stage": "Artifacts",
+        "ptmtools.pipeline.artifacts": "Artifacts",
         "ptmtools.pipeline.validation": "validate",
         "ptmtools.scene": "IngestOptions Scene ingest",
         "ptmtools.site.content": "Site SiteOptions site_of",

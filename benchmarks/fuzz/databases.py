@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garbled, twisted
 from ptmtools.cli.main import main
-from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, STAGES
 from ptmtools.store import lists
 from ptmtools.store.archive import pack_arrays, unpack_arrays

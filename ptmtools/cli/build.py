@@ -29,11 +29,12 @@ from ptmtools.cli.parameters import (
     with_console,
 )
 from ptmtools.output.emitters import GLTF
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.records import NEVER_RUN, StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor
-from ptmtools.pipeline.stage import Artifacts, Stage
+from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED

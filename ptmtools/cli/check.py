@@ -30,8 +30,8 @@ from ptmtools.diagnostics import CODES, FOLDER_CODES, NOT_BUILT, SEEN_BY_BUILD, 
 from ptmtools.errors import CheckError
 from ptmtools.folder_kinds import folder_kind
 from ptmtools.output import PlotOptions
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import build_command, open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.pipeline.validation import shoot_segments, validate as check
 from ptmtools.quantities import count, size

@@ -36,8 +36,8 @@ def init(console: Console, db: str, output: str | None, force: bool) -> None:
     names of the places."""
     from ptmtools.files import refuse_existing, write_bytes
     from ptmtools.output.served import place_names
+    from ptmtools.pipeline.artifacts import Artifacts
     from ptmtools.pipeline.command import naming_command, open_database
-    from ptmtools.pipeline.stage import Artifacts
     from ptmtools.pipeline.stages import CELLS, SCENE
     from ptmtools.tour.model import NAME
     from ptmtools.tour.starting import first_tour

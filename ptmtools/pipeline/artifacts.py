@@ -21,10 +21,6 @@ from ptmtools.store.layout import MANIFEST, arrays_of, sha256
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from ptmtools.output.representation import Represented
     from ptmtools.parallel import Workers
     from ptmtools.store.folder import DatabaseFolder
     from ptmtools.store.manifest import StageRecord

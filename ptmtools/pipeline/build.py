@@ -14,10 +14,11 @@ from contextlib import ExitStack
 from typing import Any
 
 from ptmtools.parallel import Workers
+from ptmtools.pipeline.artifacts import Run
 from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
-from ptmtools.pipeline.stage import Options, Run, Stage
+from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import EMIT, SCENE, STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.layout import MANIFEST

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ptmtools.executor import Executor
-    from ptmtools.pipeline.stage import Run
+    from ptmtools.pipeline.artifacts import Run
     from ptmtools.store.objects import Objects
     from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction

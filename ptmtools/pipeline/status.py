@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ptmtools.errors import DatabaseError
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import chosen_options
 from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import reasons
-from ptmtools.pipeline.stage import Artifacts, Options, Stage
+from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, STAGING

@@ -22,8 +22,9 @@ from ptmtools.diagnostics import CODES, Findings, Issue, ValidationReport, worst
 from ptmtools.errors import DatabaseError
 from ptmtools.folder_kinds import folder_kind
 from ptmtools.output import validate_database, validate_ptm
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts, Stage
+from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE, STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder

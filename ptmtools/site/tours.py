@@ -18,7 +18,7 @@ from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError, naming
 from ptmtools.output.served import place_names
-from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.store.folder import DatabaseFolder

@@ -28,8 +28,8 @@ from ptmtools.link import read_trace
 from ptmtools.options import arguments
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_served
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.quantities import count
 from ptmtools.rendering.light import with_lamp
 from ptmtools.rendering.pyramids import read_pyramids

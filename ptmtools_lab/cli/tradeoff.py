@@ -24,8 +24,8 @@ from ptmtools.cli.parameters import (
 )
 from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.walk import read_walk
 from ptmtools_lab.figures import require
 from ptmtools_lab.path.making import path_through

@@ -18,7 +18,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_index
-from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.store.layout import SERVED

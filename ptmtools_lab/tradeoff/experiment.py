@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.stage import Artifacts, Stage
+    from ptmtools.pipeline.artifacts import Artifacts
+    from ptmtools.pipeline.stage import Stage
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,9 @@ from typing import Any
 from ptmtools.errors import InputError
 from ptmtools.jit import compilations
 from ptmtools.options import option_name
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import run_stage
-from ptmtools.pipeline.stage import Artifacts, Options, Stage
+from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import ACH, CELLS, EMIT, LIGHT, PVS, STAGES, TEXTURES
 from ptmtools_lab.tradeoff.experiment import timed
 

@@ -21,7 +21,7 @@ from ptmtools.errors import InputError, PtmError
 from ptmtools.link import Conditions, Trace
 from ptmtools.options import option
 from ptmtools.output.served import Served, read_served
-from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import MemorySize, count, size

@@ -20,7 +20,8 @@ from urllib.parse import quote
 
 from ptmtools.lazy import Lazy, component
 from ptmtools.output.names import plain_name
-from ptmtools.pipeline.stage import Artifacts, Job, Run, SceneOrigin, Stage, described
+from ptmtools.pipeline.artifacts import Artifacts, Run
+from ptmtools.pipeline.stage import Job, SceneOrigin, Stage, described
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED, STAGES_FOLDER, arrays_of

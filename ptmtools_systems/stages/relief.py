@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptmtools.lazy import Lazy
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
-from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
+from ptmtools.pipeline.stage import Job, Stage, described
 from ptmtools.pipeline.stages.scene import SCENE, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size

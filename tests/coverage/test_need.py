@@ -21,9 +21,9 @@ from ptmtools.coverage.required_levels import (
 )
 from ptmtools.coverage.sampling import HintSampler
 from ptmtools.errors import InputError
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 
 TWO_ROOMS = Path(__file__).parents[2] / "sample_data/two_rooms/two_rooms.obj"

@@ -17,7 +17,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.stage import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.pipeline.stages.scene import images_of
 from ptmtools.store.archive import pack_arrays, unpack_arrays

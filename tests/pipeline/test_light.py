@@ -17,9 +17,9 @@ from ptmtools.light.options import LightOptions
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.served import read_served
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.encoding import TextureOptions
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import LIGHT
 from ptmtools.pipeline.status import database_status, plan_build
 from ptmtools.pipeline.validation import validate

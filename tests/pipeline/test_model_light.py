@@ -19,8 +19,8 @@ from ptmtools.light.occlusion import points_on
 from ptmtools.light.options import LightOptions
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf_reader import read_glb
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE, light as light_stage
 from ptmtools.pipeline.stages.light import lightmap_files
 from ptmtools.pipeline.status import plan_build

@@ -18,8 +18,8 @@ from ptmtools.output.gltf_reader import ReadPrimitive, read_glb
 from ptmtools.output.names import HINTS
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.served import read_served
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 from ptmtools.pipeline.validation import validate
 from ptmtools.scene.options import IngestOptions

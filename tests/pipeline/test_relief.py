@@ -18,8 +18,8 @@ from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.names import HINTS
 from ptmtools.output.options import EmitOptions
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import SCENE
 from ptmtools.pipeline.status import plan_build
 from ptmtools.pipeline.validation import validate

@@ -18,8 +18,8 @@ from ptmtools.errors import DatabaseError
 from ptmtools.light.options import LightOptions
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.names import HINTS
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import ACH, CELLS, EMIT, SCENE, STAGES
 from ptmtools.pipeline.status import database_status, plan_build
 from ptmtools.pipeline.validation import validate

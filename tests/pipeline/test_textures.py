@@ -14,9 +14,9 @@ from PIL import Image, PngImagePlugin
 from ptmtools import parallel
 from ptmtools.executor import Executor
 from ptmtools.parallel import Workers
+from ptmtools.pipeline.artifacts import Run
 from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.encoding import TextureOptions
-from ptmtools.pipeline.stage import Run
 from ptmtools.pipeline.stages import CELLS, TEXTURES
 from ptmtools.pipeline.stages.textures import TexturesJob
 from ptmtools.store.writer import DatabaseWriter

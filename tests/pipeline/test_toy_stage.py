@@ -14,7 +14,8 @@ import pytest
 from ptmtools.cells.model import Cells
 from ptmtools.cli.main import main
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.stage import Artifacts, Stage
+from ptmtools.pipeline.artifacts import Artifacts
+from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, STAGES
 from ptmtools.store.folder import DatabaseFolder
 

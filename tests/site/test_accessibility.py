@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from benchmarks.npm import AXE
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.tour.starting import first_tour

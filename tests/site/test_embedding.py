@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.about import element_tags
 from ptmtools.site.content import Site, SiteOptions, site_of

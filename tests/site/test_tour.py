@@ -14,8 +14,8 @@ import pytest
 
 from ptmtools.errors import InputError
 from ptmtools.output.served import place_names
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.tour.starting import first_tour

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools import plugins
 from ptmtools.output.options import EmitOptions
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.encoding import (
     fallback_level,
     fallback_preview,
     preview_file,
     stem_of,
 )
-from ptmtools.pipeline.stage import Artifacts, Job, Stage, described
+from ptmtools.pipeline.stage import Job, Stage, described
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.light import LIGHT, lightmap_files

@@ -16,8 +16,9 @@ from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.lazy import Lazy, component
 from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
+from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
-from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage, described
+from ptmtools.pipeline.stage import Job, Stage, described
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.stage import Artifacts, Job, SceneOrigin, Stage, changes_of
+from ptmtools.pipeline.artifacts import Artifacts
+from ptmtools.pipeline.stage import Job, SceneOrigin, Stage, changes_of
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
 from ptmtools.store.layout import IMAGE_LIST, IMAGES, LIGHTS, arrays_of, sha256

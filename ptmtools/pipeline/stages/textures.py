@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import naming
+from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import (
     EncodedAtUrl,
     ImageFile,
@@ -38,7 +39,7 @@ from ptmtools.pipeline.encoding import (
     stem_of,
     steps_file,
 )
-from ptmtools.pipeline.stage import Artifacts, Job, Run, Stage
+from ptmtools.pipeline.stage import Job, Stage
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests, image_rows, images_of

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from ptmtools.light.options import LightOptions
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import LIGHT
 from ptmtools_lab.tradeoff.experiment import Subject
 from ptmtools_lab.tradeoff.knobs import own_options, settings

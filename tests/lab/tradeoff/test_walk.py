@@ -17,9 +17,9 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError, LimitError
 from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
+from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stage import Artifacts
 from ptmtools.pipeline.stages import CELLS, EMIT, LIGHT, STAGES, TEXTURES
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk
