@@ -34,7 +34,7 @@ from ptmtools.cells import Cells, subdivide
 from ptmtools.coverage.model import Ach
 from ptmtools.output import EmitExtras, EmitOptions, TextureRecord, emit
 from ptmtools.output.content import Content
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.gltf import gltf_files
 from ptmtools.output.numbers import row_texts
@@ -125,7 +125,7 @@ class Written:
         return sum(map(len, self.files))
 
     def row(self, name: str, other: Written | None = None) -> None:
-        packed = sum(len(compressed(data)) for data in self.files)
+        packed = sum(len(compress(data)) for data in self.files)
         line = (
             f"  {name:24}{self.triangles:9}{self.size / 1e3:10.1f}{packed / 1e3:9.1f}"
             f"{self.size / self.triangles:9.1f}{self.seconds:9.3f}"

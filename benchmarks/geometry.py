@@ -36,7 +36,7 @@ from scenes import MODELS, MUSEUM, ROOT, model_file
 from ptmtools.cells import subdivide
 from ptmtools.meshopt.encoding import encode_attributes, encode_triangles
 from ptmtools.output.content import Content
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.output.gltf import gltf_files, unpack
 from ptmtools.output.gltf_compressed import MESHOPT
 from ptmtools.output.grid import COARSEST
@@ -59,7 +59,7 @@ class Geometry:
     @property
     def wire(self) -> int:
         """Bytes with gzip."""
-        return sum(len(compressed(data)) for data in self.files)
+        return sum(len(compress(data)) for data in self.files)
 
     def row(self, model_triangles: int, step: str = "") -> None:
         print(

@@ -204,7 +204,7 @@ def cell_texts(
     ach: Any = SimpleNamespace(value=np.concatenate(hints))  # all that a cell's file has of it
     content = Content(scene, cells, pvs, ach, records)
     writer = CellWriter(content)
-    images = [used.tolist() for used in content.painted]
+    images = [used.tolist() for used in content.cell_textures]
     return [CellText(writer.cell(c)[0], images[c]) for c in range(cells.cell_count)]
 
 

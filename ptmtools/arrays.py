@@ -69,7 +69,7 @@ def volumes(corners: Floats) -> Floats:
     return np.asarray(np.abs(np.einsum("ij,ij->i", a, cross(b, c))) / 6)
 
 
-def summed(group: NDArray[np.integer], weights: NDArray[Any], count: int) -> Floats:
+def sum_by_group(group: NDArray[np.integer], weights: NDArray[Any], count: int) -> Floats:
     """(count,) the sum of the (n,) weights of each group."""
     return np.asarray(np.bincount(group, weights, count), dtype=np.float64)
 

@@ -177,7 +177,7 @@ class Findings:
         severity, _ = self._codes[code]
         self.take([Issue(code, severity, one_line(file), one_line(place), one_line(message))])
 
-    def at(self, file: str, place: str = "") -> Place:
+    def place(self, file: str, place: str = "") -> Place:
         """A place in a file, to add issues."""
         return Place(self, file, place)
 
@@ -219,7 +219,7 @@ class Place:
         """Adds an issue here, or at another place in the file."""
         self.findings.add(code, self.file, place or self.place, message)
 
-    def at(self, place: str) -> Place:
+    def with_place(self, place: str) -> Place:
         """Another place in the file."""
         return Place(self.findings, self.file, place)
 

@@ -94,10 +94,10 @@ class PtmError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickles errors of other processes with the attributes that ``args`` lacks."""
-        return _restored, (type(self), str(self)), vars(self)
+        return _restore_error, (type(self), str(self)), vars(self)
 
 
-def _restored(kind: type[PtmError], text: str) -> PtmError:
+def _restore_error(kind: type[PtmError], text: str) -> PtmError:
     return kind.__new__(kind, text)
 
 

@@ -78,8 +78,8 @@ class FolderKind:
 
 
 def folder_kinds() -> dict[str, FolderKind]:
-    """All kinds, by the name of the index; raises as `plugins.declared`."""
-    return {kind.index: kind for kind in plugins.declared("pages", FolderKind).values()}
+    """All kinds, by the name of the index; raises as `plugins.declarations`."""
+    return {kind.index: kind for kind in plugins.declarations("pages", FolderKind).values()}
 
 
 def folder_kind(folder: Path) -> FolderKind | None:

@@ -74,7 +74,7 @@ def load(kind: str, point: EntryPoint, cls: type[D]) -> D:
 
 
 @cache
-def declared(kind: str, cls: type[D]) -> Mapping[str, D]:
+def declarations(kind: str, cls: type[D]) -> Mapping[str, D]:
     """The declarations of a kind by name, in the order of their names; raises as `points` and
     `load`."""
     return {name: load(kind, point, cls) for name, point in points(kind).items()}

@@ -63,7 +63,7 @@ class MemorySize:
     bytes: int | None = None
     share: Fraction | None = None
 
-    def of(self, whole: int) -> int | None:
+    def limit_of(self, whole: int) -> int | None:
         """Bytes, rounded down, of ``whole`` bytes; None for no limit."""
         return self.bytes if self.share is None else math.floor(self.share * whole)
 

@@ -160,7 +160,7 @@ class Tolerance:
         return Tolerance.for_extent(extent, step)
 
 
-def ranked(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def rank(values: NDArray[np.float64]) -> NDArray[np.int64]:
     """(n,) indices of values >= 0 from the greatest to the least; values that differ by less than
     `TIE_SHARE` of themselves are in the order of their indices, whatever their last digits."""
     order = np.argsort(-values, kind="stable")

@@ -53,7 +53,7 @@ class Waits:
         self._spans = _merge_spans(np.concatenate([waited, busy]))
         self._ends = np.sort(waited[:, 1])
 
-    def until(self, moment: float) -> float:
+    def wait_end(self, moment: float) -> float:
         """Returns the end of a wait that starts at ``moment``, s: ``moment`` itself, or the next
         recorded end if it lies within a waiting interval."""
         row = int(np.searchsorted(self._spans[:, 0], moment, "right")) - 1

@@ -76,12 +76,12 @@ class FolderForm:
         force: bool = False,
     ) -> None:
         """Writes a folder of (path, bytes), atomically; raises as `staged`."""
-        with self.staged(folder, force=force) as put:
+        with self.stage_files(folder, force=force) as put:
             for path, data in files:
                 put(path, data)
 
     @contextlib.contextmanager
-    def staged(
+    def stage_files(
         self, folder: str | os.PathLike[str], *, force: bool = False
     ) -> Iterator[Callable[[str, bytes], None]]:
         """A function of path and contents that adds a file; the files become the folder as the

@@ -233,7 +233,7 @@ class Client(ABC):
         """Requests a file up to a byte."""
         part, now = self.files[kind].ask(number, end), self.link.now
         browser = self.world.track.browser
-        late = browser.sent.until(now) - now if browser else 0.0
+        late = browser.sent.wait_end(now) - now if browser else 0.0
         self.waiting.append(self.link.request(part.end - part.begin, priority, part, late))
 
     def open(self) -> None:

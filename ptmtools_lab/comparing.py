@@ -162,7 +162,7 @@ def counted(world: World, options: SimulateOptions) -> World:
 def budget_of(world: World, memory: MemorySize, form: str = PTM) -> int:
     """Bytes of texture memory. A share is relative to all `.ptm`s, whatever the form of the
     textures; no limit is the memory of all textures in that form."""
-    limit = memory.of(world.catalogue.whole)
+    limit = memory.limit_of(world.catalogue.whole)
     return world.in_form(form).catalogue.whole if limit is None else limit
 
 
@@ -211,7 +211,7 @@ def play(
     for done, (link, memory, policy, name) in enumerate(cases):
         progress(done, len(cases), "simulating")
         if isinstance(policy, CampusPolicy):
-            limit = memory.of(worlds[name].catalogue.whole)
+            limit = memory.limit_of(worlds[name].catalogue.whole)
             outcome = measure_campus_walk(campuses[name], worlds[name], policy, link, limit)
             result.append(RunResult(name, memory.text, *outcome))
             continue

@@ -175,7 +175,7 @@ class _Clock:
             if finished:
                 free = self._link.now
                 if self._browser:
-                    free = self._browser.taken.until(free)
+                    free = self._browser.taken.wait_end(free)
                 if free <= self._link.now and not self._late:
                     self._handle(finished)
                 else:

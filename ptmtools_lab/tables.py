@@ -131,7 +131,7 @@ def look(
             weight,
             [_Tally(triangles_of(maps), textures, lossy, whole, seen) for textures in shown],
         )
-        for maps, weight in ((surfaces.light, 1.0), (surfaces.bumped, NORMALS))
+        for maps, weight in ((surfaces.light, 1.0), (surfaces.bump_surfaces, NORMALS))
         if maps is not None
     ]
     relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None

@@ -97,11 +97,11 @@ def track_of(served: Served, walk: Walk, rate: float = RATE) -> tuple[Track, Flo
         rate, time = (len(walk.time) - 1) / walk.duration, walk.time
         eye, direction, cell = walk.eye, walk.direction, browser.cell
         if (cell < 0).any():
-            cell = np.where(cell < 0, served.locator.along(eye), cell)
+            cell = np.where(cell < 0, served.locator.cells_along(eye), cell)
         drawn = _drawn(time, browser.age)
     else:
         eye, direction = walk.at(time)
-        cell = served.locator.along(eye)
+        cell = served.locator.cells_along(eye)
     pose = np.concatenate([eye, direction], axis=1)
     if drawn is not None:
         pose = pose[np.where(drawn < 0, np.arange(len(time)), drawn)]

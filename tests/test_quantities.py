@@ -45,7 +45,7 @@ def test_what_is_no_duration(text: str) -> None:
     + [("4096", 4096), ("1.9", 1), ("10%", 100), ("29%", 290), ("12.34%", 123), ("inf", None)],
 )
 def test_memory(text: str, of_1000: int | None) -> None:
-    assert parse_memory(f" {text}").of(1000) == of_1000
+    assert parse_memory(f" {text}").limit_of(1000) == of_1000
     assert str(parse_memory(text)) == text
 
 
@@ -58,7 +58,7 @@ def test_what_is_no_memory(text: str) -> None:
 @given(st.integers(1, 10**12), st.integers(0, 10**14))
 def test_hundredths_of_a_percent_are_exact(hundredths: int, whole: int) -> None:
     text = f"{hundredths // 100}.{hundredths % 100:02}%"
-    assert parse_memory(text).of(whole) == hundredths * whole // 10_000
+    assert parse_memory(text).limit_of(whole) == hundredths * whole // 10_000
 
 
 def test_what_people_read() -> None:

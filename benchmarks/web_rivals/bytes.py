@@ -19,7 +19,7 @@ from benchmarks.web_rivals.__main__ import SCENES, database_in, subject_of
 from benchmarks.web_rivals.entrants import Subject, walk_page
 from benchmarks.web_rivals.images import in_form
 from benchmarks.web_rivals.models import whole_glb
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.site.entry import Entry, link_bytes
 
 #: What of a site's data is neither geometry nor texture: first letters of names.
@@ -74,7 +74,7 @@ def model_weight(subject: Subject) -> Weight:
     images = sum(len(image.load()) for image in subject.scene.images)
     if subject.source:
         return Weight(subject.source.stat().st_size - images, images)
-    return Weight(len(compressed(whole_glb(subject.scene))), images)
+    return Weight(len(compress(whole_glb(subject.scene))), images)
 
 
 def site_weight(files: Mapping[str, Entry]) -> Weight:

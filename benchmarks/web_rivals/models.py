@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.output.gltf import WRAPS, linear, pack
-from ptmtools.output.gltf_shapes import PlainBuffer, flipped
+from ptmtools.output.gltf_shapes import PlainBuffer, flip_v
 from ptmtools.scene.model import Material, Scene
 
 UNLIT = "KHR_materials_unlit"
@@ -70,7 +70,7 @@ def whole_glb(scene: Scene, images: Sequence[bytes] = (), media: str = "") -> by
 
 def _primitive(scene: Scene, rows: Any, material: int, buffer: PlainBuffer) -> dict[str, Any]:
     points = scene.corners[rows].reshape(-1, 3).astype(np.float32)
-    uv = flipped(scene.uv[rows].reshape(-1, 2))
+    uv = flip_v(scene.uv[rows].reshape(-1, 2))
     vertices, triangle = np.unique(
         np.concatenate([points, uv], axis=1), axis=0, return_inverse=True
     )

@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 from urllib.parse import unquote
 
 from benchmarks.web_rivals.link import BUFFER
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.site.entry import Entry
 
 HTTP = ("1.1", "2")
@@ -174,7 +174,7 @@ def _write(files: Mapping[str, Entry], folder: Path) -> None:
             continue
         data = entry.read()
         path.write_bytes(data)
-        if entry.compressed and len(small := compressed(data)) < len(data):
+        if entry.compressed and len(small := compress(data)) < len(data):
             path.with_name(f"{path.name}.gz").write_bytes(small)
 
 

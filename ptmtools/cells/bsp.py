@@ -33,7 +33,7 @@ from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.split_planes import DoorPlanes, Reveals
 from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.progress import Progress
-from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
 OCCLUSION_WEIGHT = 0.5
 BALANCE_WEIGHT = 0.3
@@ -367,7 +367,7 @@ def _candidates(fragments: list[_Fragment]) -> Iterator[tuple[int, int]]:
     batch = count if count * count <= _PAIRS else max(_FEW, _PAIRS // count)
     order = np.arange(count)
     if batch < count:
-        order = ranked(np.array([f.area for f in fragments]))
+        order = rank(np.array([f.area for f in fragments]))
     for turn, first in enumerate(range(0, count, batch)):
         for i in sorted(order[first : first + batch].tolist()):
             yield turn, i

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ptmtools.arrays import Floats, normals, summed
+from ptmtools.arrays import Floats, normals, sum_by_group
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.doors import Doors
 from ptmtools.cells.floors import Floors, ceiling_height, detail_of
@@ -96,7 +96,7 @@ def _openings(tree: Tree, tolerance: Tolerance) -> Portals:
 def _weight_by_leaf(tree: Tree, points: Floats, weight: Floats) -> Floats:
     """(L,) the weight of the points in each leaf."""
     leaf = -2 - descend(tree.planes, tree.children, points)
-    return summed(leaf, weight, len(tree.leaves))
+    return sum_by_group(leaf, weight, len(tree.leaves))
 
 
 def _points_beside(corners: Floats, distance: float) -> tuple[Floats, Floats]:

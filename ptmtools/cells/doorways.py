@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
+from ptmtools.arrays import Bools, Floats, Ints, cross, normals, sum_by_group
 from ptmtools.cells.planar import unite
 from ptmtools.cells.search import ByHeight
 from ptmtools.cells.structure import Structure, Surroundings
@@ -66,7 +66,7 @@ class Slabs:
         size = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
         parts = (normal[:, :, None] * normal[:, None, :] / size[:, None, None]).reshape(-1, 9)
         count = int(group.max(initial=-1)) + 1
-        tensor = np.stack([summed(group, part, count) for part in parts.T], axis=1)
+        tensor = np.stack([sum_by_group(group, part, count) for part in parts.T], axis=1)
         across = np.linalg.eigh(tensor.reshape(-1, 3, 3))[1][:, :, 2]
         upright = np.abs(across[:, 1]) <= _LEANS
         across[upright, 1] = 0.0

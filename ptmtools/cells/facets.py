@@ -13,11 +13,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, normals, summed
+from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
 from ptmtools.cells.planar import bounded, count, divided, simplified
 from ptmtools.cells.planes import UPWARD, plane_axes
 from ptmtools.cells.search import distinct
-from ptmtools.tolerance import Tolerance, ranked
+from ptmtools.tolerance import Tolerance, rank
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,13 @@ class Facets:
         beyond = across_edges(mesh.triangle, turned)
         region, queue = np.full(len(turned), -1), np.empty(len(turned), dtype=np.int64)
         slack = _FLAT_SHARE * tolerance.plane
-        seeds = ranked(double)
+        seeds = rank(double)
         count = grow_regions(mesh.point, mesh.triangle, beyond, normal, seeds, slack, region, queue)
-        mean = np.stack([summed(region, column, count) for column in normal.T], axis=1)
+        mean = np.stack([sum_by_group(region, column, count) for column in normal.T], axis=1)
         mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), np.finfo(float).tiny)
         height = np.einsum("tci,ti->tc", corners, mean[region])
-        level = summed(region, double * height.mean(axis=1), count)
-        weight = summed(region, double, count)
+        level = sum_by_group(region, double * height.mean(axis=1), count)
+        weight = sum_by_group(region, double, count)
         level = np.divide(level, weight, out=level, where=weight > 0)
         away = np.abs(height - level[region, None]).max(axis=1) > 2 * slack
         whole = np.bincount(region, away, count) == 0
@@ -126,11 +126,11 @@ class Facets:
         many = self.whole & (size >= _MANY) & (edges <= size / 2)
         chosen = np.flatnonzero(many)
         outline = rim & many[self.region][:, None]
-        area = summed(self.region, self.areas * which, len(self.area))[chosen]
+        area = sum_by_group(self.region, self.areas * which, len(self.area))[chosen]
         corners, of = self._retriangulate(chosen, area, outline, tolerance)
         # Wound as most of the region is.
         facing = self.areas * which * np.where(self.turned, -1.0, 1.0)
-        facing = summed(self.region, facing, len(self.area))[chosen]
+        facing = sum_by_group(self.region, facing, len(self.area))[chosen]
         back = np.einsum("ij,ij->i", normals(corners), self.normal[chosen[of]]) * facing[of] < 0
         corners[back] = corners[back][:, ::-1]
         count = np.bincount(of, minlength=len(chosen))

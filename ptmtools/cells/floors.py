@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges, summed
+from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges, sum_by_group
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.planar import Geometry, united_by
@@ -35,7 +35,7 @@ from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import distinct
 from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance, ranked
+from ptmtools.tolerance import Tolerance, rank
 
 #: Number of small regions from which a floor is a scan.
 _SCAN = 20_000
@@ -116,7 +116,7 @@ def _slopes(corners: Floats, region: Ints, patch: Bools) -> Floats:
     largest = order[np.unique(region[order], return_index=True)[1]]
     normal = normals(corners)
     normal *= np.where(normal[:, 1] < 0, -1.0, 1.0)[:, None]
-    mean = np.stack([summed(region, column, len(patch)) for column in normal.T], axis=1)
+    mean = np.stack([sum_by_group(region, column, len(patch)) for column in normal.T], axis=1)
     normal = np.where(patch[:, None], mean, normal[largest])
     slope = -normal[:, PLAN] / normal[:, 1:2]
     at = corners[largest].mean(axis=1)
@@ -176,7 +176,7 @@ def _floors(corners: Floats, floor_area: float) -> tuple[Floats, Floats, Bools]:
     area = np.linalg.norm(normal, axis=1) / 2
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
     floor = np.flatnonzero(level & (area >= floor_area / 10))
-    order = floor[ranked(area[floor])][:FLOOR_SAMPLES]
+    order = floor[rank(area[floor])][:FLOOR_SAMPLES]
     height = float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
     apart = min(HEAD_ROOM, SLAB_SHARE * height)
     walkable = corners[level]

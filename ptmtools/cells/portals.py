@@ -38,7 +38,7 @@ from ptmtools.cells.planar import (
 )
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import Structure, Surroundings
-from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ def largest_leaf(
     corners = structure.corners
     roomy = np.array([body.width >= 2 * walker.radius for body in tree.leaves])
     choice = np.flatnonzero(allowed & roomy if roomy.any() else allowed)
-    order = choice[ranked(np.array([tree.leaves[leaf].volume for leaf in choice]))].tolist()
+    order = choice[rank(np.array([tree.leaves[leaf].volume for leaf in choice]))].tolist()
     middle = {leaf: tree.leaves[leaf].points.mean(axis=0) for leaf in order}
     hollow: Iterable[int] = ()
     outwards = bool(order) and _outwards(corners)

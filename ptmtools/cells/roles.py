@@ -18,7 +18,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Ints, summed
+from ptmtools.arrays import Bools, Ints, sum_by_group
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.search import connected
@@ -122,7 +122,9 @@ def _detail_groups(group: Ints, facets: Facets, wall_area: float) -> Bools:
     # The area of the flat region of each triangle: what could split or block.
     region = np.where(facets.whole, facets.area, 0.0)[facets.region]
     flat = np.where(region >= FLAT_SHARE * wall_area, facets.areas, 0.0)
-    curved = summed(group, flat, len(size)) <= FLAT * summed(group, facets.areas, len(size))
+    curved = sum_by_group(group, flat, len(size)) <= FLAT * sum_by_group(
+        group, facets.areas, len(size)
+    )
     curved &= np.maximum.reduceat(region[order], begin) <= LARGEST_FLAT_SHARE * wall_area
     small = (longest <= LARGEST) & (shortest >= COMPACT * longest)
     return np.asarray((size >= DENSE) & small & curved)

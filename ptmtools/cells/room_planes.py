@@ -28,7 +28,7 @@ from ptmtools.cells.polyhedron import Polyhedron, cut, section
 from ptmtools.cells.portals import Portal, find_portals
 from ptmtools.cells.room_volumes import Volume
 from ptmtools.cells.structure import Structure, WallPlane
-from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
 #: Contacts are compared by the share of the leaf's section that they cover, in this many digits.
 _DIGITS = 4
@@ -71,7 +71,7 @@ def _layers(corners: Floats, least: float, tolerance: Tolerance) -> list[tuple[F
     """The planes, (4,) facing outwards, in which a mesh has an area of at least ``least`` m², and
     its triangles there."""
     size = areas(corners)
-    left = ranked(size)[: np.count_nonzero(size > 0)]
+    left = rank(size)[: np.count_nonzero(size > 0)]
     result = []
     while len(left):
         normal = normals(corners[left[:1]])[0]

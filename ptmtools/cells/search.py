@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bits, Bools, Floats, Ints, summed
+from ptmtools.arrays import Bits, Bools, Floats, Ints, sum_by_group
 from ptmtools.tolerance import Tolerance
 
 #: Odd, with no pattern in its bits: 2⁶⁴ over the golden ratio.
@@ -191,7 +191,7 @@ class Bins:
     def weights(self, weights: Floats) -> Floats:
         """(b,) the sum in each bin of (n,) weights."""
         every = np.repeat(weights, _GRIDS)
-        return summed(self._label.ravel(), every, self.count)
+        return sum_by_group(self._label.ravel(), every, self.count)
 
     def drop(self, weights: Floats, planes: Ints, weight: Floats) -> None:
         """Subtracts (k,) ``weight`` of these planes from the ``weights`` of the bins."""
@@ -206,7 +206,7 @@ class Bins:
     def own_sums(self, planes: Ints, weights: Floats) -> Floats:
         """(k,) the sum of (k,) ``weights``, of these planes, in the bin of each."""
         names, place = np.unique(self._label[planes], return_inverse=True)
-        sums = summed(place.ravel(), np.repeat(weights, _GRIDS), len(names))
+        sums = sum_by_group(place.ravel(), np.repeat(weights, _GRIDS), len(names))
         result: Floats = sums[np.searchsorted(names, self.own[planes])]
         return result
 

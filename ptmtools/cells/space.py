@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints, summed
+from ptmtools.arrays import Bools, Floats, Ints, sum_by_group
 from ptmtools.cells.bsp import SplitPlanes, Tree, build_tree
 from ptmtools.cells.building import Building
 from ptmtools.cells.doors import THICK, open_doors
@@ -39,7 +39,7 @@ from ptmtools.cells.search import connected
 from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
-from ptmtools.tolerance import Tolerance, ranked
+from ptmtools.tolerance import Tolerance, rank
 
 #: A group of leaves with less walkable floor than this, m², is dropped without a note,
 LEAST_PLACE = 0.05
@@ -145,7 +145,7 @@ def unreached(
         outside_room = UnreachedRoom.of(np.unique(sheltered.leaf), sheltered)
     # In a model whose room faces point outwards, solids cannot be recognised.
     volumes = np.array([body.volume for body in tree.leaves]) * reached
-    middles = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:LOOKS]])
+    middles = np.array([tree.leaves[i].points.mean(axis=0) for i in rank(volumes)[:LOOKS]])
     recognisable = not around.solid(middles)
     rooms = []
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
@@ -196,8 +196,8 @@ def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
     group_of_body = group[standing.leaf]
     order = np.argsort(group_of_body, kind="stable")
     start = np.searchsorted(group_of_body[order], np.arange(len(group) + 1))
-    area = summed(group_of_body, standing.place, len(group))
-    for name in ranked(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
+    area = sum_by_group(group_of_body, standing.place, len(group))
+    for name in rank(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
         yield standing.only(order[start[name] : start[name + 1]])
 
 

@@ -27,7 +27,7 @@ from ptmtools.cells.planes import Frame, bounds, parallel_gap, plane_axes
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron, section
 from ptmtools.cells.search import Tries
 from ptmtools.cells.structure import Structure, WallPlane
-from ptmtools.tolerance import TIE_SHARE, ranked
+from ptmtools.tolerance import TIE_SHARE, rank
 
 
 class Reveals:
@@ -79,7 +79,7 @@ class Reveals:
         spans = self._span(inside, low, high, width)
         bridging = inside[spans]
         result: list[WallPlane] = []
-        for seed in bridging[ranked(areas[bridging])]:
+        for seed in bridging[rank(areas[bridging])]:
             plane = structure.planes[seed]
             apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in result)
             if min(apart, default=self._limit) < self._tolerance.thin:
@@ -165,7 +165,7 @@ def _planes(structure: Structure, triangles: Ints) -> list[tuple[Frame, Ints]]:
     layers: list[tuple[float, Floats, Ints]] = []
     left = triangles
     while len(left):
-        plane = structure.planes[left[ranked(structure.areas[left])[0]]]
+        plane = structure.planes[left[rank(structure.areas[left])[0]]]
         flat = structure.lie_in(plane, left)
         layers.append((float(structure.areas[left[flat]].sum()), plane, left[flat]))
         left = left[~flat] if flat.any() else left[1:]
@@ -196,7 +196,7 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     own = structure.bins.own[inside]
     caps: list[tuple[int, WallPlane]] = []
     tries = Tries(np.unique(own, return_inverse=True)[1].reshape(-1), areas)
-    for seed in ranked(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
+    for seed in rank(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
         if not (free[seed] and tries.worth[seed]):
             continue
         mates = np.flatnonzero(structure.bins.holds(own[seed], inside))

@@ -21,7 +21,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, normals, summed
+from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
@@ -30,7 +30,7 @@ from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import Bins, Nearby, Tries, connected
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
         if np.any(large):
             walls = shapely.multipolygons(parts[large])
             walls_by_area.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
-    return [walls_by_area[i][1] for i in ranked(np.array([area for area, _ in walls_by_area]))]
+    return [walls_by_area[i][1] for i in rank(np.array([area for area, _ in walls_by_area]))]
 
 
 def _may_hold_wall(structure: Structure, frame: Frame, flat: Ints, least: float) -> bool:
@@ -177,7 +177,7 @@ def _may_hold_wall(structure: Structure, frame: Frame, flat: Ints, least: float)
     low, high = corner.min(axis=1) - gap / 2, corner.max(axis=1) + gap / 2
     boxes = shapely.box(*low.T, *high.T)
     group = connected(len(flat), shapely.STRtree(boxes).query(boxes).T)
-    return bool((summed(group, structure.areas[flat], len(flat)) >= least).any())
+    return bool((sum_by_group(group, structure.areas[flat], len(flat)) >= least).any())
 
 
 def without_facets(walls: list[WallPlane]) -> list[WallPlane]:
@@ -208,7 +208,7 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     layers: list[tuple[float, Floats]] = []
     promising = free & (waiting[bins.own] >= wall_area)
     tries = Tries(bins.own, areas)
-    for seed in ranked(np.where(promising, areas, 0.0))[: np.count_nonzero(promising)]:
+    for seed in rank(np.where(promising, areas, 0.0))[: np.count_nonzero(promising)]:
         if not (free[seed] and tries.worth[seed]):
             continue
         free[seed] = False
@@ -226,7 +226,7 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
             layers.append((weight, planes[seed]))
         else:
             tries.fail(seed, near[free[near]], wall_area)
-    return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
+    return [layers[i][1] for i in rank(np.array([weight for weight, _ in layers]))]
 
 
 #: Number of triangles in a plane from which all of them count as one cluster.

@@ -39,7 +39,7 @@ Report = dict[str, Any]
 STANDARD = "-"
 
 
-def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
+def expand_patterns(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
     """The files of patterns, which are expanded as by a shell (``**`` is any folder) unless a file
     has that very name; of folders, their files with one of the ``suffixes``; other names unchanged.
 
@@ -185,7 +185,7 @@ def jobs_for(
     suffix: str,
     suffixes: Sequence[str],
 ) -> list[Job]:
-    """One job for each file of `expanded`.
+    """One job for each file of `expand_patterns`.
 
     ``output`` is a folder if it exists as one or ends with a slash, or if the user has ``given``
     several files, a folder or a pattern; a single file of the last two may still go to a name with
@@ -194,7 +194,7 @@ def jobs_for(
 
     Raises click.UsageError; InputError PTM-I120.
     """
-    sources = expanded(given, inside)
+    sources = expand_patterns(given, inside)
     if output == "":
         raise click.BadParameter("the name is empty", None, None, "-o")
     if STANDARD in sources and len(sources) > 1:
@@ -207,7 +207,9 @@ def jobs_for(
             raise click.UsageError("only one file can go to standard output")
         return nameless + [Job(name) for name in named]
     if output is None:
-        return nameless + _apart({name: _beside(name, None, suffix) for name in named}, None)
+        return nameless + _make_jobs(
+            {name: _output_path(name, None, suffix) for name in named}, None
+        )
     several = max(len(given), len(named)) > 1 or any(
         name != STANDARD and _several(name) for name in given
     )
@@ -216,7 +218,7 @@ def jobs_for(
         folder = Path(output)
         if os.path.lexists(folder) and not folder.is_dir():
             raise click.BadParameter(f"{folder} is a file, not a folder", None, None, "-o")
-        return nameless + _apart({n: _beside(n, folder, suffix) for n in named}, folder)
+        return nameless + _make_jobs({n: _output_path(n, folder, suffix) for n in named}, folder)
     if len(named) > 1:
         raise click.BadParameter(
             f"{output} is one file, but there are {len(named)} to write: specify a folder, or end "
@@ -262,12 +264,12 @@ def _streams(name: str) -> bool:
         return False
 
 
-def _beside(name: str, folder: Path | None, suffix: str) -> Path:
+def _output_path(name: str, folder: Path | None, suffix: str) -> Path:
     path = Path("stdin" if name == STANDARD else name).with_suffix(suffix)
     return folder / path.name if folder else path
 
 
-def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
+def _make_jobs(targets: dict[str, Path], folder: Path | None) -> list[Job]:
     """A job for each target; with a fault if several sources have it."""
     places: dict[str, list[str]] = {}
     for name, target in targets.items():

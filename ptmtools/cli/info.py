@@ -122,7 +122,7 @@ def _info_ptm(console: Console, target: str) -> None:
         description = _description(file.read(length), crc32)
     whole = whole_levels(header, file_bytes)
     levels = _levels(header)
-    fields = None if description is None else _described(description)
+    fields = None if description is None else _description_fields(description)
     document = {
         **asdict(header),
         "description": fields,
@@ -188,7 +188,7 @@ def _description(data: bytes, crc32: int) -> Description | None:
         return None
 
 
-def _described(description: Description) -> dict[str, Any]:
+def _description_fields(description: Description) -> dict[str, Any]:
     """The fields of a description that are set."""
     own = description
     fields = {
@@ -246,7 +246,7 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
     for place, other in enumerate(model.others):
         if place == 0 or other.rival:
             yield "alternative", _guess(other)
-    yield "closed", _closed(around)
+    yield "closed", _closed_text(around)
     names = f": {some(list(around.doors))}" if around.doors else ""
     yield "doors", f"{len(around.doors)} recognised{names}"
     if scene.storeys:
@@ -289,7 +289,7 @@ def _guess(guess: Guess) -> str:
     return f"unit {guess.unit}, {guess.up.upper()} up: {guess.size}{why}"
 
 
-def _closed(around: Enclosure) -> str:
+def _closed_text(around: Enclosure) -> str:
     if not around.rooms:
         return "unknown: no place has a roof above and walls around it"
     if around.closed:

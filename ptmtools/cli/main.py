@@ -66,11 +66,11 @@ OWN = {
 
 
 def entries() -> dict[str, Entry]:
-    """All commands that are not stages, by name; raises as `plugins.declared`."""
-    return {**plugins.declared("commands", Entry), **OWN}
+    """All commands that are not stages, by name; raises as `plugins.declarations`."""
+    return {**plugins.declarations("commands", Entry), **OWN}
 
 
-def headed() -> dict[str, dict[str, Entry]]:
+def commands_by_heading() -> dict[str, dict[str, Entry]]:
     """Heading → name → command, in the order of ``ptm --help``."""
     groups: dict[str, dict[str, Entry]] = {heading: {} for heading in HEADINGS}
     for name, entry in (OWN | entries()).items():
@@ -116,7 +116,7 @@ class Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         tables = {
             heading: [(name, entry.about) for name, entry in group.items() if not entry.hidden]
-            for heading, group in headed().items()
+            for heading, group in commands_by_heading().items()
         }
         tables["Individual stages of build-scene"] = [(n, s.about) for n, s in _stages().items()]
         width = max(len(name) for rows in tables.values() for name, _ in rows)

@@ -104,11 +104,11 @@ class Content:
         return Geometry(self.scene, self.cells)
 
     @cached_property
-    def lit(self) -> Geometry:
+    def lit_geometry(self) -> Geometry:
         """`geometry` with the light, and the coordinates in normal maps of objects."""
         light, maps = self.extras.light, object_maps(self.extras.represented)
-        lit = self.geometry.lit_by(light) if light else self.geometry
-        return lit.mapped_by(maps, self.scene, self.cells) if maps else lit
+        lit = self.geometry.with_light(light) if light else self.geometry
+        return lit.with_object_maps(maps, self.scene, self.cells) if maps else lit
 
     @cached_property
     def position_exponent(self) -> int:
@@ -125,7 +125,7 @@ class Content:
         if self.options.lods != "auto" or not any(form.has_meshes for form in self.emitters):
             return ()
         replaced = replaced_objects(self.extras.represented)
-        return mesh_levels(self.lit, replaced, self.extras.progress)
+        return mesh_levels(self.lit_geometry, replaced, self.extras.progress)
 
     @cached_property
     def mesh_of(self) -> Mapping[tuple[int, int], int]:
@@ -153,7 +153,7 @@ class Content:
         return paint
 
     @cached_property
-    def painted(self) -> list[NDArray[np.int64]]:
+    def cell_textures(self) -> list[NDArray[np.int64]]:
         """For each cell the indices of its textures in `textures`, ascending."""
         start, places = self.geometry.cell_start[1:-1], self.places
         of_shapes = np.split(self.paint, start)

@@ -139,7 +139,7 @@ def portal_polygons(
     points = coordinates(point, "portals")
     decimals = np.array(points, dtype=np.float64)
     readings = np.stack([decimals, decimals.astype(np.float32).astype(np.float64)])
-    bent = _bent(readings, start, normal, slack)
+    bent = _may_be_concave(readings, start, normal, slack)
     polygons = []
     for k, (first, last) in enumerate(zip(start[:-1].tolist(), start[1:].tolist(), strict=True)):
         polygon = points[first:last]
@@ -158,7 +158,7 @@ def _units(corners: Floats) -> Floats:
     return unit
 
 
-def _bent(
+def _may_be_concave(
     readings: Floats, start: NDArray[np.integer], normal: Floats, slack: float
 ) -> NDArray[np.bool_]:
     """(K,) whether a polygon of the (r, Q, 3) points may have a corner more than ``slack`` outside
@@ -180,7 +180,7 @@ def _convex(readings: Floats, normal: Floats, slack: float) -> list[int]:
     """Which corners of the (r, n, 3) readings of a polygon to keep, ascending: all but those that
     reach the least beyond the line between their neighbours, until it is convex."""
     kept = list(range(readings.shape[1]))
-    while len(kept) > 3 and _outside(points := readings[:, kept], normal) > slack:
+    while len(kept) > 3 and _concavity(points := readings[:, kept], normal) > slack:
         before = np.roll(points, 1, axis=1)
         chord = np.roll(points, -1, axis=1) - before
         height = cross(points - before, chord) @ normal
@@ -189,7 +189,7 @@ def _convex(readings: Floats, normal: Floats, slack: float) -> list[int]:
     return kept
 
 
-def _outside(readings: Floats, normal: Floats) -> float:
+def _concavity(readings: Floats, normal: Floats) -> float:
     """How far a corner of (r, n, 3) polygons lies outside of the line of an edge, metres."""
     edge = np.roll(readings, -1, axis=1) - readings
     inner = cross(normal, edge) / np.maximum(np.linalg.norm(edge, axis=2), _TINY)[..., None]

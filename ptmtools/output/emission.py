@@ -52,7 +52,7 @@ _GZIP = bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
 _TEXT = (".wrl", ".json")
 
 
-def compressed(data: bytes) -> bytes:
+def compress(data: bytes) -> bytes:
     """A gzip file of these bytes."""
     deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     body = deflate.compress(data) + deflate.flush()
@@ -83,7 +83,7 @@ def write_files(
         real_folder(folder, name.rpartition("/")[0])
         write_bytes(folder / name, data, force=force)
         if gzip and name.endswith(_TEXT):
-            packed = compressed(data)
+            packed = compress(data)
             write_bytes(copy, packed, force=force)
             return {name: len(data), f"{name}{GZIP}": len(packed)}
         if force:
@@ -106,7 +106,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> VisitCost:
     geometry = _geometry(content, fetched[0], sizes) if fetched else nothing
     meshes = _meshes(content, fetched[0], sizes) if fetched else nothing
     paints = np.zeros((pvs.cell_count, len(records)), dtype=np.bool_)
-    for cell, places in enumerate(content.painted):
+    for cell, places in enumerate(content.cell_textures):
         paints[cell, places] = True
     sees = np.array([paints[pvs.row(c)].any(axis=0) for c in range(pvs.cell_count)])
     used = np.flatnonzero(paints.any(axis=0))

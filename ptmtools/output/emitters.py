@@ -57,7 +57,7 @@ _HINTS = Emitter(
 #: The names of `--format`, in the order of writing.
 EMITTERS: dict[str, Emitter] = {
     emitter.name: emitter
-    for emitter in (VRML, GLTF, *plugins.declared("emitters", Emitter).values())
+    for emitter in (VRML, GLTF, *plugins.declarations("emitters", Emitter).values())
 }
 #: Written after the chosen ones, with every choice.
 _ALWAYS = (_HINTS,)

@@ -100,7 +100,9 @@ class FirstLooks:
         content = self._content
         ach, seen = content.ach, content.pvs.row(cell)
         floor = float(ach.floor[cell])
-        shares = {t: 0.0 for visible in seen.tolist() for t in content.painted[visible].tolist()}
+        shares = {
+            t: 0.0 for visible in seen.tolist() for t in content.cell_textures[visible].tolist()
+        }
         if ach.by_texture:
             rows = ach.entries(cell)
             of_cell = slice(*ach.texture_start[[rows.start, rows.stop]].tolist())
@@ -113,7 +115,9 @@ class FirstLooks:
         else:
             for visible, value in zip(seen.tolist(), ach.row(cell).tolist(), strict=True):
                 for texture, part in zip(
-                    content.painted[visible].tolist(), self._parts[visible].tolist(), strict=True
+                    content.cell_textures[visible].tolist(),
+                    self._parts[visible].tolist(),
+                    strict=True,
                 ):
                     shares[texture] += value * part
         return {texture: max(value, floor) for texture, value in sorted(shares.items())}
@@ -124,7 +128,7 @@ class FirstLooks:
         texture."""
         geometry, parts = self._content.geometry, []
         of_shape, area = self._content.paint, geometry.areas()
-        for cell, textures in enumerate(self._content.painted):
+        for cell, textures in enumerate(self._content.cell_textures):
             shapes = slice(*geometry.cell_start[cell : cell + 2].tolist())
             whole = float(area[shapes].sum()) or 1.0
             texture_area = [
@@ -150,7 +154,7 @@ def steps_of(record: TextureRecord, side: int) -> list[LevelStep]:
         while len(corners) > 1 and _slope(*corners[-2:]) <= _slope(corners[-1], corner):
             corners.pop()
         corners.append(corner)
-    return list(_between(corners))
+    return list(_level_steps(corners))
 
 
 def _slope(before: tuple[int, int, float], after: tuple[int, int, float]) -> float:
@@ -158,6 +162,6 @@ def _slope(before: tuple[int, int, float], after: tuple[int, int, float]) -> flo
     return (after[2] - before[2]) / (after[1] - before[1])
 
 
-def _between(corners: list[tuple[int, int, float]]) -> Iterator[LevelStep]:
+def _level_steps(corners: list[tuple[int, int, float]]) -> Iterator[LevelStep]:
     for (_, start, before), (level, end, after) in pairwise(corners):
         yield LevelStep(level, start, end, after - before)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import areas, summed
+from ptmtools.arrays import areas, sum_by_group
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import single
@@ -128,7 +128,7 @@ class Geometry:
             uv_corner, shape, len(first), len(self.uv)
         )
 
-    def lit_by(self, light: Light) -> Geometry:
+    def with_light(self, light: Light) -> Geometry:
         """The same geometry with a light: lightmaps, and colours where that is at vertices.
 
         Raises DatabaseError PTM-D008 if it is that of other geometry.
@@ -148,7 +148,7 @@ class Geometry:
             result.color = np.rint(255 * to_srgb(linear)).astype(np.uint8)
         return result
 
-    def mapped_by(self, maps: ObjectMaps, scene: Scene, cells: Cells) -> Geometry:
+    def with_object_maps(self, maps: ObjectMaps, scene: Scene, cells: Cells) -> Geometry:
         """The same geometry with the normal maps of objects."""
         result = copy(self)
         result.relieved = np.isin(self.object, maps.objects)
@@ -170,7 +170,7 @@ class Geometry:
         count = np.diff(self.triangle_start)
         first = np.repeat(self.point_start[:-1], count)[:, None]
         corners = self.point[self.shape_point[first + self.triangle]].astype(np.float64)
-        return summed(np.repeat(np.arange(len(count)), count), areas(corners), len(count))
+        return sum_by_group(np.repeat(np.arange(len(count)), count), areas(corners), len(count))
 
     def shape(self, s: int) -> Shape:
         """One shape."""

@@ -37,7 +37,7 @@ from ptmtools.output.content import Content
 from ptmtools.output.geometry import Shape
 from ptmtools.output.gltf_compressed import CompressedBuffer
 from ptmtools.output.gltf_shapes import PlainBuffer, Sizes, VertexTables, vertices_of
-from ptmtools.output.model import FileError, TextureRecord, shaped
+from ptmtools.output.model import FileError, TextureRecord, convert_shape_errors
 from ptmtools.output.names import GLTF_FILES, UP, cell_name, mesh_name, mesh_path, path_of
 from ptmtools.output.representation import node_extras, replaced_objects
 from ptmtools.scene.colors import to_linear
@@ -76,7 +76,7 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
             raise ValueError("not JSON and BIN alone, each of a multiple of 4 bytes", "byte 12")
     except ValueError as fault:
         raise FileError("PTM-D731", fault.args[1], fault.args[0]) from None
-    with shaped("PTM-D731", "JSON"):
+    with convert_shape_errors("PTM-D731", "JSON"):
         return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])
 
 
@@ -251,10 +251,10 @@ def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
         )
     content.extras.progress(count, count, "glTF")
     for mesh in content.meshes:
-        finest = [s for s in content.lit.shapes(mesh.cell) if s.object == mesh.object]
+        finest = [s for s in content.lit_geometry.shapes(mesh.cell) if s.object == mesh.object]
         finer: list[tuple[VertexTables, Iterable[Shape]]] = [(m, m.shapes) for m in mesh.levels[1:]]
         for number, (tables, shapes) in zip(
-            mesh.files, [*finer, (content.lit, finest)], strict=True
+            mesh.files, [*finer, (content.lit_geometry, finest)], strict=True
         ):
             drawn = ((tables, shape, None) for shape in shapes)
             yield mesh_path(number), _glb(content, mesh.cell, mesh_name(number), drawn)
@@ -268,10 +268,10 @@ _Drawn = tuple[VertexTables, Shape, int | None]
 def _drawn_shapes(content: Content, cell: int) -> Iterator[_Drawn]:
     """The shapes of a cell, of objects with levels those of the coarsest mesh."""
     done = set()
-    for shape in content.lit.shapes(cell):
+    for shape in content.lit_geometry.shapes(cell):
         place = content.mesh_of.get((cell, shape.object))
         if place is None:
-            yield content.lit, shape, None
+            yield content.lit_geometry, shape, None
         elif place not in done:
             done.add(place)
             level = content.meshes[place].levels[0]

@@ -81,15 +81,15 @@ def vertices_of(tables: VertexTables, shape: Shape, *, textured: bool) -> Vertic
         rgba = np.full((len(color), 4), 65535, np.uint16)
         rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
     point = tables.point[shape.point[vertex // width]]
-    uv = flipped(tables.uv[shape.uv[vertex % width]]) if textured else None
-    light = None if second is None else flipped(second[:, :2])
+    uv = flip_v(tables.uv[shape.uv[vertex % width]]) if textured else None
+    light = None if second is None else flip_v(second[:, :2])
     frame = None if second is None or shape.relief is None else second[:, 2:]
     third = len(present) > 1 and second is not None
-    normal = flipped(second[:, 2:4]) if third and second is not None else None
+    normal = flip_v(second[:, 2:4]) if third and second is not None else None
     return Vertices(point, uv, rgba, triangle, light, frame, normal)
 
 
-def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
+def flip_v(uv: NDArray[np.floating]) -> NDArray[np.float32]:
     """Texture coordinates with the origin at the upper left instead of the lower, or back."""
     turned = np.array(uv, dtype=np.float64)
     turned[..., 1] = 1 - turned[..., 1]

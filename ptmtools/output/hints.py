@@ -223,7 +223,7 @@ class RecordWriter:
             "visible": visible,
             "ach": content.shares[cell],
             "floor": significant(content.ach.floor[cell : cell + 1])[0],
-            "textures": [content.painted[seen].tolist() for seen in visible],
+            "textures": [content.cell_textures[seen].tolist() for seen in visible],
         }
         if content.ach.by_texture:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
@@ -244,7 +244,7 @@ class RecordWriter:
     def _need(self, need: Need, cell: int) -> list[list[Any]]:
         """For each visible texture its index, the coarsest required level, and shares."""
         content, cells = self._content, self._content.pvs.row(cell).tolist()
-        visible = {place for seen in cells for place in content.painted[seen].tolist()}
+        visible = {place for seen in cells for place in content.cell_textures[seen].tolist()}
         images = {image: place for image, (place, _) in content.places.of_image.items()}
         maps = dict(enumerate(place for place, _ in content.places.of_object.values()))
         rows = []

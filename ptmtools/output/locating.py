@@ -22,7 +22,7 @@ class Locator:
         self._low = np.array([p.min(axis=0) for p in points]) - SLACK
         self._high = np.array([p.max(axis=0) for p in points]) + SLACK
 
-    def along(self, eye: Floats) -> Ints:
+    def cells_along(self, eye: Floats) -> Ints:
         """(F,) the cell of each of (F, 3) eyes along a walk: the previous one if it still contains
         the eye; -1 for none."""
         cells = np.full(len(eye), -1, np.int64)
@@ -36,14 +36,14 @@ class Locator:
             cells[f] = cell
         return cells
 
-    def outside(self, cell: int, point: Floats) -> Floats:
+    def distance_outside(self, cell: int, point: Floats) -> Floats:
         """(n,) metres from (n, 3) points to a cell: the largest distance in front of a plane of a
         leaf, least over the leaves; 0 or less inside."""
         leaves = [(point @ leaf[:, :3].T + leaf[:, 3]).max(axis=1) for leaf in self._planes[cell]]
         return np.asarray(np.min(leaves, axis=0))
 
     def _contains(self, cell: int, point: Floats) -> bool:
-        return bool(self.outside(cell, point[None])[0] <= SLACK)
+        return bool(self.distance_outside(cell, point[None])[0] <= SLACK)
 
 
 def _planes(leaf: Mapping[str, Any]) -> Floats:

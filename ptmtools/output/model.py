@@ -261,7 +261,7 @@ class WriterOptions:
         elif self.need < 0:
             fault = f"--need {self.need} is below 0"
         if fault:
-            raise refused(fault)
+            raise option_error(fault)
 
     def avatar(self, walker: Walker) -> Vector:
         """``avatar_size``, by default that of the walker."""
@@ -269,7 +269,7 @@ class WriterOptions:
         return self.avatar_size or (walker.radius, eye, walker.step)
 
 
-def refused(problem: str) -> InputError:
+def option_error(problem: str) -> InputError:
     """The error for an option out of range."""
     return InputError("PTM-I111", problem, remedy="leave the option out for its default")
 
@@ -376,7 +376,7 @@ class FileError(Exception):
 
 
 @contextmanager
-def shaped(code: str, place: str = "") -> Iterator[None]:
+def convert_shape_errors(code: str, place: str = "") -> Iterator[None]:
     """Turns a violation of a schema into a FileError of this code; ``place`` is that of a fault of
     the whole document."""
     try:

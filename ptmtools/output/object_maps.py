@@ -53,7 +53,7 @@ class ObjectMaps:
         frame = stored.array("frame", np.float32, len(uv), 7, finite=True)
         return ObjectMaps(objects, side, uv, frame)
 
-    def painted(self, scene: Scene) -> Scene:
+    def scene_with_maps(self, scene: Scene) -> Scene:
         """The scene as changed; of it, each of these objects has its normal map for an image,
         numbered as in `objects`, and other surfaces have none."""
         mapped = np.isin(scene.triangle_object, self.objects)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ptmtools.options import option
 from ptmtools.output.emitters import EMITTERS, chosen_emitters
-from ptmtools.output.model import WriterOptions, refused
+from ptmtools.output.model import WriterOptions, option_error
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class EmitOptions(WriterOptions):
             if not any(emitter.cell_files for emitter in emitters):
                 raise ValueError("none of them is of cells; add vrml or gltf")
         except ValueError as error:
-            raise refused(f"--format: {error}") from None
+            raise option_error(f"--format: {error}") from None
         chosen = {emitter.name for emitter in emitters}
         names = ",".join(name for name in EMITTERS if name in chosen)
         object.__setattr__(self, "format", names)

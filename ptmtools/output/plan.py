@@ -185,7 +185,7 @@ class _Plan:
         plan = np.concatenate([cells.leaf_point, *cells.left_out])[:, [0, 2]]
         width, depth = np.ptp(plan, axis=0)
         self._turned = bool(depth > _DEEP * width)
-        shown = self._shown(plan)
+        shown = self._to_paper(plan)
         low, high = shown.min(axis=0), shown.max(axis=0)
         rim = _RIM * float((high - low).max())
         self._low, self._high = low - rim, high + rim
@@ -218,10 +218,10 @@ class _Plan:
             axis.set_axis_off()
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
             self._storey(axis, floor, shades, panel)
-            draw_left_out(axis, self._cells, self._floors, i, self._shown)
-            draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._shown)
+            draw_left_out(axis, self._cells, self._floors, i, self._to_paper)
+            draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._to_paper)
             if self._way is not None:
-                draw_way(axis, self._way, self._floors, i, self._shown)
+                draw_way(axis, self._way, self._floors, i, self._to_paper)
         if barred:
             long = min(0.8 * (height - head), 4.0)
             low = height - head - _CAPTION - long
@@ -229,7 +229,7 @@ class _Plan:
             self._colour_bar(figure, place, shades)
         return figure
 
-    def _shown(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _to_paper(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
         """(…, 2) plan coordinates (x, z) as (right, down) on paper."""
         return np.stack([plan[..., 1], -plan[..., 0]], axis=-1) if self._turned else plan
 
@@ -238,13 +238,13 @@ class _Plan:
 
         height = cut_height(self._cells, floor, self._options.height)
         sections = list(self._sections(height))
-        polygons = [self._shown(polygon) for _, polygon in sections]
+        polygons = [self._to_paper(polygon) for _, polygon in sections]
         fills = [self._fill(cell, shades) for cell, _ in sections]
         # Edges in their own fill close the seams between the leaves of a cell.
         axis.add_collection(
             PolyCollection(polygons, facecolors=fills, edgecolors=fills, linewidths=0.5)
         )
-        draw_view_only(axis, self._cells, sections, self._shown)
+        draw_view_only(axis, self._cells, sections, self._to_paper)
         edges = _outlines(sections, self._cells.tolerance.grid)
         for zorder, colour, width, segments in (
             (2, _CELL_EDGE, 0.5, [e for outline in edges.values() for e in outline]),
@@ -253,7 +253,7 @@ class _Plan:
             (4, _SEE_THROUGH, 1.4, triangle_section(self._corners[~self._opaque], height)),
             (5, _WALL, 1.2, triangle_section(self._corners[self._opaque], height)),
         ):
-            lines = [self._shown(segment) for segment in segments]
+            lines = [self._to_paper(segment) for segment in segments]
             settings = {"capstyle": "butt"} if zorder > 2 else {}
             axis.add_collection(
                 LineCollection(lines, colors=colour, linewidths=width, zorder=zorder, **settings)
@@ -311,7 +311,7 @@ class _Plan:
             home.setdefault(numbers[cell], cell)
         for cell, polygon in largest.items():
             name = self._cells.room_name(cell) if home[numbers[cell]] == cell else ""
-            width, depth = np.ptp(self._shown(polygon), axis=0) * points
+            width, depth = np.ptp(self._to_paper(polygon), axis=0) * points
             text = f"{cell}\n{name}" if name else str(cell)
             if _letters(text, width, depth) < _SMALLEST:
                 text = str(cell)
@@ -319,7 +319,7 @@ class _Plan:
             if min(width, depth) < _NARROWEST or size < _SMALLEST:
                 continue
             (middle,) = shapely.get_coordinates(shapely.centroid(shapely.Polygon(polygon)))
-            x, y = self._shown(middle)
+            x, y = self._to_paper(middle)
             dark = self._shade is not None and self._shade.get(cell, 0.0) > _DARK
             ink, paper = (_PAPER, _INK) if dark else (_INK, _PAPER)
             axis.text(

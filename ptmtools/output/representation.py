@@ -77,11 +77,11 @@ class Represented:
 
 
 def representations() -> tuple[Representation, ...]:
-    """All kinds, in the order of their names; raises as `plugins.declared`."""
-    return tuple(plugins.declared("representations", Representation).values())
+    """All kinds, in the order of their names; raises as `plugins.declarations`."""
+    return tuple(plugins.declarations("representations", Representation).values())
 
 
-def listed(index: Mapping[str, Any]) -> Iterator[Representation]:
+def representations_in(index: Mapping[str, Any]) -> Iterator[Representation]:
     """The kinds that an index of the hints, or of a site, has a list of."""
     return (kind for kind in representations() if index.get(kind.name))
 

@@ -72,7 +72,7 @@ class Served:
 
     def file(self, url: str) -> Path:
         """A file that the index names. Raises DatabaseError PTM-D006 for one outside the folder."""
-        return _inside(self.folder, url)
+        return _path_within(self.folder, url)
 
     def read(self, url: str) -> bytes:
         """The bytes of a file that the index names. Raises DatabaseError PTM-D005, D006."""
@@ -120,17 +120,19 @@ def read_served(database: str | os.PathLike[str]) -> Served:
             remedy="write it with `ptm emit DB --format vrml,gltf`",
         )
     names = [cell["name"] for cell in index["cells"]]
-    pairs = [_document(_of(folder, index["record"], name), schemas.CELL) for name in names]
+    pairs = [
+        _document(_template_path(folder, index["record"], name), schemas.CELL) for name in names
+    ]
     records = tuple(document for document, _ in pairs)
     for cell, (name, record) in enumerate(zip(names, records, strict=True)):
-        file = _of(folder, index["record"], name)
+        file = _template_path(folder, index["record"], name)
         _check_record(file, record, cell, len(names), index["textures"])
     statistics, statistics_bytes = _document(
-        _inside(folder, index["statistics"]), schemas.STATISTICS
+        _path_within(folder, index["statistics"]), schemas.STATISTICS
     )
     geometry, sizes = [], []
     for cell, name in enumerate(names):
-        file = _of(folder, index["geometry"][FORM], name)
+        file = _template_path(folder, index["geometry"][FORM], name)
         data = _bytes(file)
         geometry.append(_glb(file, data, cell, index))
         sizes.append(on_link(data))
@@ -140,7 +142,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         if member:
             place = f"meshes[{number}].{member}"
             raise DatabaseError("PTM-D006", message, file=folder / HINTS, place=place, remedy=BUILD)
-        files = [_inside(folder, url) for url in row["files"]]
+        files = [_path_within(folder, url) for url in row["files"]]
         bodies = [_bytes(file) for file in files]
         mesh_bytes.append(tuple(map(on_link, bodies)))
         whole = _glb(files[-1], bodies[-1], row["cell"], index)
@@ -172,11 +174,11 @@ def place_names(database: str | os.PathLike[str]) -> tuple[str, ...]:
     return tuple(filter(None, names))
 
 
-def _of(folder: Path, template: str, name: str) -> Path:
-    return _inside(folder, template.replace("{name}", name))
+def _template_path(folder: Path, template: str, name: str) -> Path:
+    return _path_within(folder, template.replace("{name}", name))
 
 
-def _inside(folder: Path, url: str) -> Path:
+def _path_within(folder: Path, url: str) -> Path:
     path = Path(os.path.normpath(folder / unquote(url)))
     if not path.is_relative_to(folder):
         raise DatabaseError(

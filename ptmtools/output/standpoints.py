@@ -51,7 +51,7 @@ class FloorFinder:
         self._triangle = triangle[order]
         self._start = np.searchsorted(square[order], np.arange(self._side**2 + 1))
 
-    def below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def floor_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) height of the nearest floor at or below each of (n, 3) points, or -inf."""
         heights = np.full(len(points), -np.inf)
         plan = points[:, [0, 2]]
@@ -185,7 +185,7 @@ def _floor(cells: Cells, leaf: int, ground: FloorFinder) -> float:
     middle = cells.leaf_points(leaf).mean(axis=0)
     section = leaf_section(cells, leaf, float(middle[1]))
     plan = _grid(section) if len(section) >= 3 else middle[None, [0, 2]]
-    below = np.sort(ground.below(np.insert(plan, 1, middle[1], axis=1)))
+    below = np.sort(ground.floor_below(np.insert(plan, 1, middle[1], axis=1)))
     return float(below[len(below) // 2])
 
 
@@ -205,7 +205,7 @@ def _place_in(
     clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, sides))
     grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
     position = np.insert(grid, 1, room.floor + eye, axis=1)
-    floor = ground.below(position)
+    floor = ground.floor_below(position)
     position[:, 1] = floor + eye
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
     waiting, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
@@ -226,7 +226,7 @@ def _level(
     """(n,) whether no floor around (n, 3) positions lies above the one at the position itself."""
     around = np.repeat(position[:, None], len(_AROUND), axis=1)
     around[..., [0, 2]] += radius * _AROUND
-    height = ground.below(around.reshape(-1, 3)).reshape(len(position), len(_AROUND))
+    height = ground.floor_below(around.reshape(-1, 3)).reshape(len(position), len(_AROUND))
     return np.asarray((height < floor[:, None] + _LIFT).all(axis=1))
 
 

@@ -119,7 +119,7 @@ class Surfaces:
         )
 
     @property
-    def bumped(self) -> Surfaces | None:
+    def bump_surfaces(self) -> Surfaces | None:
         """The same surfaces with the normal maps of their materials as textures; None if there are
         no such maps."""
         bumps = self.bumps
@@ -159,7 +159,7 @@ def sides(corner: Floats, cell: NDArray[np.int32], two_sided: Bools, locator: Lo
         outside = np.empty(len(first))
         for c in np.unique(cell[second]).tolist():
             rows = np.flatnonzero(cell[second] == c)
-            outside[rows] = locator.outside(c, point[rows])
+            outside[rows] = locator.distance_outside(c, point[rows])
         # The copy in the cell that the point is deepest in comes last and wins.
         order = np.lexsort((-outside, first))
         order = order[outside[order] < SLACK / 2]
@@ -193,7 +193,7 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         rows = np.array(values, dtype=kind).reshape(len(shapes), *shape)
         return np.repeat(rows, count, axis=0)
 
-    def joined(rows: list[NDArray[Any]], width: int) -> Floats:
+    def stack_rows(rows: list[NDArray[Any]], width: int) -> Floats:
         return np.concatenate([np.zeros((0, 3, width)), *rows])
 
     materials = [p.material for _, p in shapes]
@@ -201,16 +201,16 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         -1 if p.uv is None or p.material.texture is None else p.material.texture for _, p in shapes
     ]
     lightmap = [-1 if m.light is None else m.light for m in materials]
-    spot = joined([corners_of(p.light, p.triangle) for _, p in shapes], 2)
+    spot = stack_rows([corners_of(p.light, p.triangle) for _, p in shapes], 2)
     clamp = WRAPS["clamp"]
-    corner = joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
+    corner = stack_rows([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
     cell = spread([cell for cell, _ in shapes], np.int32)
     two_sided = spread([m.two_sided for m in materials], np.bool_)
     factor = spread([m.factor[:3] for m in materials], np.float64, 3)
-    vertex_colors = joined([_colors(p) for _, p in shapes], 3)
+    vertex_colors = stack_rows([_colors(p) for _, p in shapes], 3)
     return Surfaces(
         corner=corner,
-        uv=joined([corners_of(p.uv, p.triangle) for _, p in shapes], 2),
+        uv=stack_rows([corners_of(p.uv, p.triangle) for _, p in shapes], 2),
         cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),

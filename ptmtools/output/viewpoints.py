@@ -191,7 +191,7 @@ def _standing(
     """A place to stand at a position, and its cell, -1 for none; on the floor below if that is
     within reach."""
     eye = options.avatar(cells.walker)[1]
-    floor = float(ground.below(position[None])[0])
+    floor = float(ground.floor_below(position[None])[0])
     if position[1] - floor <= _REACH * eye:
         on_floor = np.array([position[0], floor + eye, position[2]])
         cell = _cell_to_stand_in(cells, on_floor)

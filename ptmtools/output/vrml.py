@@ -37,12 +37,12 @@ def field(items: Sequence[str], per_line: int = 8, between: str = ",") -> str:
     return "[ " + "\n".join(rows) + " ]"
 
 
-def listed(items: Sequence[str], per_line: int) -> str:
+def list_field(items: Sequence[str], per_line: int) -> str:
     """A field of strings or of single numbers."""
     return field(items, per_line, ", ")
 
 
-def chosen(rows: Sequence[str], index: NDArray[np.integer], per_line: int = 8) -> str:
+def rows_field(rows: Sequence[str], index: NDArray[np.integer], per_line: int = 8) -> str:
     """The field of some of the rows."""
     return field([rows[i] for i in index.tolist()], per_line)
 
@@ -52,7 +52,7 @@ def loops(polygons: NDArray[np.integer], per_line: int = 8) -> str:
     return field([f"{row} -1" for row in row_texts(polygons)], per_line)
 
 
-def quoted(text: str) -> str:
+def sf_string(text: str) -> str:
     """An SFString."""
     flat = " ".join(text.split())
     return '"' + flat.replace("\\", "\\\\").replace('"', '\\"') + '"'
@@ -104,12 +104,12 @@ class CellWriter:
         self._geometry = g = content.geometry
         self._objects, self._materials = content.scene.objects, content.scene.materials
         self._urls = {
-            image: f"url {listed(_urls(record, content.options.fallback), 2)}"
+            image: f"url {list_field(_urls(record, content.options.fallback), 2)}"
             for image, (_, record) in content.places.of_image.items()
         }
         cells, self._pvs = content.cells, content.pvs
         self._adjacent = cells.adjacent()
-        self._cell_url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
+        self._cell_url = [sf_string(cell_file(c)) for c in range(cells.cell_count)]
         self._ach = row_texts(single(np.concatenate(content.shares), "ach")[:, None])
         self._point, self._uv = row_texts(g.point), row_texts(g.uv)
         self._leaves = [
@@ -126,17 +126,17 @@ class CellWriter:
         entries = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
         leaves = self._leaves[cell]
         lists = {
-            "cellName": quoted(cell_name(cell)),
+            "cellName": sf_string(cell_name(cell)),
             "hullPoint": field(hull_rows(hull, triangles, self._slack)),
             "hullIndex": loops(triangles, 16),
             "adjacentUrl": self._cells(self._adjacent[cell]),
             "visibleUrl": self._cells(self._pvs.cell[entries]),
-            "ach": chosen(self._ach, entries, 16),
+            "ach": rows_field(self._ach, entries, 16),
         }
         if len(leaves) > 1:
             start = np.cumsum([0, *map(len, leaves[:-1])])
             lists["leafPoint"] = _points(np.concatenate(leaves))
-            lists["leafStart"] = listed([str(i) for i in start.tolist()], 16)
+            lists["leafStart"] = list_field([str(i) for i in start.tolist()], 16)
         proto = CELL if len(leaves) == 1 else CELL_OF_LEAVES
         parts = [HEADER, declaration(*proto), "PTMCell {\n"]
         parts += [f"  {name:<11} {text}\n" for name, text in lists.items()]
@@ -153,7 +153,7 @@ class CellWriter:
         return "".join(parts), np.stack([points.min(axis=0), points.max(axis=0)])
 
     def _cells(self, cells: NDArray[np.int32]) -> str:
-        return listed([self._cell_url[c] for c in cells.tolist()], 8)
+        return list_field([self._cell_url[c] for c in cells.tolist()], 8)
 
     def _shape(
         self, shape: int, name: str, names: DefNames, textures: dict[tuple[int, str, str], str]
@@ -166,11 +166,11 @@ class CellWriter:
             self._texture(material, names, textures),
             "  }\n  geometry IndexedFaceSet {\n",
             "    solid FALSE\n" if s.two_sided else "",
-            f"    coord Coordinate {{ point {chosen(self._point, s.point)} }}\n",
+            f"    coord Coordinate {{ point {rows_field(self._point, s.point)} }}\n",
             f"    coordIndex {loops(s.triangle)}\n",
         ]
         if material.image >= 0:
-            uv = chosen(self._uv, s.uv)
+            uv = rows_field(self._uv, s.uv)
             parts.append(f"    texCoord TextureCoordinate {{ point {uv} }}\n")
             parts.append(f"    texCoordIndex {loops(s.uv_triangle)}\n")
             tinted = material.opacity >= 1 and material.color != (1.0, 1.0, 1.0)
@@ -223,7 +223,7 @@ def _color(material: Material, share: NDArray[np.float64] = _WHOLE) -> str:
 
 def _urls(record: TextureRecord, fallback: bool) -> list[str]:
     files = [record.fallback, record.file] if fallback else [record.file]
-    return [quoted("../" + quote(file)) for file in files if file is not None]
+    return [sf_string("../" + quote(file)) for file in files if file is not None]
 
 
 def _points(points: NDArray[np.float32]) -> str:
@@ -253,17 +253,17 @@ def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
 def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
     """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
     viewpoints, options = content.viewpoints, content.options
-    info = [quoted(f"ptm:database {PATTERN}")]
+    info = [sf_string(f"ptm:database {PATTERN}")]
     cell_urls = [path_of(v.cell, VRML_FILES) for v in viewpoints]
     info += [
-        quoted(f"ptm:viewpoint {v.name} {url}")
+        sf_string(f"ptm:viewpoint {v.name} {url}")
         for v, url in zip(viewpoints, cell_urls, strict=True)
     ]
     avatar = ", ".join(decimal(x) for x in options.avatar(content.cells.walker))
     parts = [
         HEADER,
         declaration(*VIEWPOINT_CELL),
-        f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
+        f"WorldInfo {{\n  title {sf_string(options.title)}\n  info {list_field(info, 1)}\n}}\n",
         f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
     ]
     poses = (
@@ -272,20 +272,20 @@ def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
     )
     parts += [
         f"DEF {v.name} Viewpoint {{ position {position} orientation {turn}"
-        f" fieldOfView {field} description {quoted(v.description)} }}\n"
+        f" fieldOfView {field} description {sf_string(v.description)} }}\n"
         for v, position, turn, field in zip(viewpoints, *poses, strict=True)
     ]
     parts += [
-        f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(url)} ] }}\n"
+        f"PTMViewpointCell {{ viewpoint {sf_string(v.name)} cellUrl [ {sf_string(url)} ] }}\n"
         for v, url in zip(viewpoints, cell_urls, strict=True)
     ]
-    for cell, (centre, size) in enumerate(zip(*map(row_texts, _centred(boxes)), strict=True)):
-        url = quoted(path_of(cell, VRML_FILES))
+    for cell, (centre, size) in enumerate(zip(*map(row_texts, _centre_boxes(boxes)), strict=True)):
+        url = sf_string(path_of(cell, VRML_FILES))
         parts.append(f"Inline {{ url [ {url} ] bboxCenter {centre} bboxSize {size} }}\n")
     return "".join(parts)
 
 
-def _centred(
+def _centre_boxes(
     boxes: Sequence[NDArray[np.float32]],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Centres and sizes (n, 3) in float32 of boxes that contain the (n, 2, 3) boxes."""

@@ -161,7 +161,7 @@ class SceneOrigin:
 def changes_of(stage: Stage[Any]) -> tuple[Stage[Any], ...]:
     """The stages of other packages that change the artifact of a stage, in the order of their
     runs."""
-    declared = plugins.declared("stages", Stage).values()
+    declared = plugins.declarations("stages", Stage).values()
     return tuple(other for other in declared if other.changes is stage)
 
 

@@ -59,7 +59,7 @@ def show_bumps(
     """Multiplies the pixels ``shown`` (n, 3) of surfaces whose materials have normal maps by the
     light on these, as a share of that on their faces; ``loaded`` and ``column`` as in
     `show_relief`."""
-    bumps, maps = surfaces.bumps, surfaces.bumped
+    bumps, maps = surfaces.bumps, surfaces.bump_surfaces
     if bumps is None or maps is None:
         return
     bumped = _with_map(sight, surfaces, bumps.number, loaded, column)

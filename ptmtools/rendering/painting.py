@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.output.representation import listed
+from ptmtools.output.representation import representations_in
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress
@@ -93,7 +93,7 @@ class SurfacePainter:
         self._column = self._columns(self._shows)
         if self._lit:
             self._lamps = lamps(self._surfaces.corner)
-            kinds = listed(self._served.index)
+            kinds = representations_in(self._served.index)
             self._painters: list[ObjectPainter] = [
                 kind.painter.load()(self._served) for kind in kinds
             ]

@@ -176,9 +176,9 @@ FORMATS = {
 
 
 def formats() -> Iterator[ModelFormat]:
-    """All formats, those of this package first; raises as `plugins.declared`."""
+    """All formats, those of this package first; raises as `plugins.declarations`."""
     yield from FORMATS.values()
-    yield from plugins.declared("formats", ModelFormat).values()
+    yield from plugins.declarations("formats", ModelFormat).values()
 
 
 def find_format(name: str | PurePath) -> ModelFormat | None:

@@ -21,11 +21,11 @@ from urllib.parse import quote, unquote
 
 from ptmtools.errors import DatabaseError, InputError, Rebuild
 from ptmtools.files import open_regular
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.output.emitter import SiteTextures
 from ptmtools.output.emitters import is_other_form, texture_forms
 from ptmtools.output.model import FileError
-from ptmtools.output.representation import Representation, listed
+from ptmtools.output.representation import Representation, representations_in
 from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
@@ -119,8 +119,8 @@ class _Builder:
         index["cells"] = list(self._cells())
         if "meshes" in index:
             index["meshes"] = list(self._meshes())
-        for kind in listed(index):
-            index[kind.name] = list(self._represented(kind))
+        for kind in representations_in(index):
+            index[kind.name] = list(self._representation_rows(kind))
         index["textures"] = list(self._textures())
         for form in texture_forms(self._served.index):
             index[form.member] = self._texture_form(form)
@@ -194,7 +194,7 @@ class _Builder:
             names, sizes = zip(*files, strict=True)
             yield row | {"files": names, "bytes": sizes}
 
-    def _represented(self, kind: Representation) -> Iterator[Mapping[str, Any]]:
+    def _representation_rows(self, kind: Representation) -> Iterator[Mapping[str, Any]]:
         """The rows of a kind of representation."""
         for row, file, digest in kind.published.load()(self._served, self._place):
             yield {**row, "file": self._files.add(file.stem, ".bin", PTM, file, digest=digest)}
@@ -216,7 +216,7 @@ class _Builder:
             except FileError as fault:
                 raise damaged(file, str(fault)) from None
         name = self._files.add(stem, suffix, media, source, digest=digest, compressed=True)
-        return name, min(len(data), len(compressed(data)))
+        return name, min(len(data), len(compress(data)))
 
     def _textures(self) -> Iterator[Mapping[str, Any]]:
         rows = self._served.index["textures"]

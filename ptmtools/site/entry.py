@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 
 #: Hex digits of a SHA-256 that make a name unique.
 DIGITS = 10
@@ -77,4 +77,4 @@ def link_bytes(entry: Entry) -> int:
     if isinstance(entry.source, Path) and not entry.compressed:
         return entry.source.stat().st_size
     data = entry.read()
-    return min(len(data), len(compressed(data))) if entry.compressed else len(data)
+    return min(len(data), len(compress(data))) if entry.compressed else len(data)

@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.output.model import sizes_of
 from ptmtools.output.served import Served
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
@@ -263,7 +263,7 @@ def openings_of(
     @cache
     def pack(kind: str, number: int, end: int) -> bytes:
         whole = kind in ("record", "geometry")
-        return compressed(read(kind, number, None)) if whole else read(kind, number, end)
+        return compress(read(kind, number, None)) if whole else read(kind, number, end)
 
     repeatable = size * REPEATED
     # The page shows all views with the angle of the first.

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from ptmtools.files import open_regular
 from ptmtools.options import option
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import GLB, Site
 from ptmtools.site.entry import Entry, is_marked
@@ -80,7 +80,7 @@ def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entr
         yield unquote(name), entry
         if options.gzip and entry.compressed:
             data = entry.read()
-            packed = compressed(data)
+            packed = compress(data)
             if len(packed) < len(data):
                 yield (
                     f"{unquote(name)}{COPY}",

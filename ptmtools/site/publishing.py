@@ -31,7 +31,7 @@ from ptmtools.files import (
     writing,
 )
 from ptmtools.output.emitters import is_other_form
-from ptmtools.output.representation import listed
+from ptmtools.output.representation import representations_in
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import Site
 from ptmtools.site.entry import Entry, link_bytes
@@ -228,7 +228,7 @@ def weight_of(site: Site) -> Weight:
         for number, row in enumerate(index["cells"])
         if row.get("standing", True)
     }
-    used = {kind.script for kind in listed(index)}
+    used = {kind.script for kind in representations_in(index)}
     used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, used)}

@@ -24,7 +24,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
 from ptmtools.files import open_regular
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.site.entry import FRESH, Entry, state_of
 from ptmtools.site.lookup import Lookup, name_of
 from ptmtools.site.throttle import Paced, Throttle, Visits
@@ -202,6 +202,6 @@ def _copy(copies: Copies, name: str, file: BinaryIO, size: int, tag: str) -> byt
     if size > _MOST:
         return b""
     if name not in copies or copies[name][0] != tag:
-        packed = compressed(file.read())
+        packed = compress(file.read())
         copies[name] = tag, packed if len(packed) < size else b""
     return copies[name][1]

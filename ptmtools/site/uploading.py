@@ -28,7 +28,7 @@ from urllib.parse import unquote
 
 from ptmtools.errors import OutputError
 from ptmtools.files import leads_inside
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.parallel import map_in_order
 from ptmtools.progress import Progress
 from ptmtools.site.content import Site
@@ -176,7 +176,7 @@ def _item(entry: Entry, *, encode: bool) -> Item:
         data = entry.read()
         if sha256(data) != digest:
             raise damaged(Path(entry.name), "it changed while it was copied")
-        packed = compressed(data)
+        packed = compress(data)
         body = data
         if len(packed) < len(data):
             body, headers = packed, replace(headers, encoding="gzip")

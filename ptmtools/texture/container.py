@@ -165,7 +165,7 @@ def read_header(data: bytes) -> PtmHeader:
 def _find_profile(version: int, profile_number: int, kind: int) -> tuple[Profile, SampleKind]:
     """The profile and the kind of samples of these numbers in a head. Raises InputError PTM-I104,
     and as `Profiles.numbered`."""
-    profile, samples = PROFILES.numbered(profile_number), KINDS_BY_NUMBER.get(kind)
+    profile, samples = PROFILES.by_number(profile_number), KINDS_BY_NUMBER.get(kind)
     if profile and samples and version >= profile.since and not (version == 1 and kind):
         return profile, samples
     package = "" if profile else "install the package that has this profile, "

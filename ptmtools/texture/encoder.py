@@ -268,7 +268,7 @@ class _LevelEncoder:
                     strip = level[box.y0 : box.y1]
                 yield box, strip
 
-        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile, LevelPair]:
+        def code_tile(job: tuple[Box, Samples]) -> tuple[Box, Tile, LevelPair]:
             box, strip = job
             piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
             under = np.ascontiguousarray(below[box.below.slices])
@@ -278,7 +278,7 @@ class _LevelEncoder:
         start = file.tell()
         file.write(bytes(across * down * TILE_ENTRY.size))
         index, pair = bytearray(), LevelPair(0.0, 0.0, 0, 0)
-        for box, tile, more in map_in_order(coded, boxes(), self.threads):
+        for box, tile, more in map_in_order(code_tile, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
             pair += more

@@ -259,7 +259,7 @@ class PtmReader:
         index, coding = self._index(level, place), Coding(header.max_error, below.memory)
         texels = np.empty((box.y1 - box.y0, box.x1 - box.x0, header.components), self.dtype)
 
-        def decoded(job: tuple[int, Box]) -> tuple[Box, Samples]:
+        def decode_tile(job: tuple[int, Box]) -> tuple[Box, Samples]:
             tile_number, area = job
             where = f"{place}, tile {tile_number}"
             under = np.ascontiguousarray(below.texels[area.below.relative_to(below.box).slices])
@@ -271,7 +271,7 @@ class PtmReader:
             return area, tile.texels
 
         jobs = tiles_under(level.width, level.height, header.tile, box)
-        for area, part in map_in_order(decoded, jobs, self._threads):
+        for area, part in map_in_order(decode_tile, jobs, self._threads):
             shared = Box(
                 max(area.x0, box.x0),
                 max(area.y0, box.y0),

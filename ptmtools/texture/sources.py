@@ -100,7 +100,7 @@ def _ranges_of_file(
     """An open file that can seek."""
     lock = Lock()
 
-    def locked(action: Callable[..., Any], *where: int) -> Any:
+    def run_locked(action: Callable[..., Any], *where: int) -> Any:
         try:
             with lock:
                 return action(*where)
@@ -112,7 +112,9 @@ def _ranges_of_file(
         file.seek(offset)
         return file.read(length)
 
-    return Ranges(partial(locked, read), partial(locked, file.seek, 0, os.SEEK_END), close, name)
+    return Ranges(
+        partial(run_locked, read), partial(run_locked, file.seek, 0, os.SEEK_END), close, name
+    )
 
 
 def open_file(path: str | os.PathLike[str]) -> BinaryIO:

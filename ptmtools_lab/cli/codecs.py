@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ptmtools.cli.batch import expanded, no_name
+from ptmtools.cli.batch import expand_patterns, no_name
 from ptmtools.cli.console import Console
 from ptmtools.cli.parameters import (
     Command,
@@ -69,7 +69,7 @@ def compare(
     from ptmtools_lab.codecs import codecs, measure, total
 
     contenders = codecs(profiles)
-    sources = expanded(images, SUFFIXES)
+    sources = expand_patterns(images, SUFFIXES)
     measured = []
     for source in sources:
         if not source:

@@ -154,10 +154,10 @@ _LIST = (
 def named_policies() -> dict[str, PolicyEntry]:
     """The policies of ptmtools by name, then those of other packages.
 
-    Raises MissingComponentError: PTM-M110 as `plugins.declared`, or a name is taken.
+    Raises MissingComponentError: PTM-M110 as `plugins.declarations`, or a name is taken.
     """
     table = {policy.name: policy for policy in _LIST}
-    for policy in plugins.declared("policies", PolicyEntry).values():
+    for policy in plugins.declarations("policies", PolicyEntry).values():
         if table.setdefault(policy.name, policy) is not policy:
             raise MissingComponentError(
                 "PTM-M110",

@@ -183,7 +183,10 @@ class PaperOptions:
         """(F,) bytes of texture memory in each frame; ``budget`` is that of a moving viewpoint."""
         static = budget
         if self.memory:
-            static_memory, whole = self.memory.of(world.catalogue.whole), world.catalogue.whole
+            static_memory, whole = (
+                self.memory.limit_of(world.catalogue.whole),
+                world.catalogue.whole,
+            )
             static = whole if static_memory is None else static_memory
         return np.where(world.track.still_after(self.static_after), static, budget)
 

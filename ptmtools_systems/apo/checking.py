@@ -145,9 +145,9 @@ def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
     files = database.resolve_each(HINTS, OCTREES.name, [row["file"] for row in rows])
     for i, (row, file) in enumerate(zip(rows, files, strict=True)):
         if fault := _row_fault(row):
-            database.at(HINTS, f"{OCTREES.name}[{i}]").add("PTM-D700", fault)
+            database.place(HINTS, f"{OCTREES.name}[{i}]").add("PTM-D700", fault)
         elif file:
-            _check_stream(row, database.head(file, row["ends"][-1] + 1), database.at(file))
+            _check_stream(row, database.head(file, row["ends"][-1] + 1), database.place(file))
 
 
 def _row_fault(row: Mapping[str, Any]) -> str:

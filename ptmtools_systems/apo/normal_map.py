@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Singles, normals, summed
+from ptmtools.arrays import Floats, Singles, normals, sum_by_group
 from ptmtools.light.atlas import Atlas, claim, cover, nearest as nearest_on, unwrap
 from ptmtools.light.lightmap import fill
 from ptmtools.output.object_maps import frame_axes
@@ -95,14 +95,14 @@ def frames(atlas: Atlas, corner: Floats) -> NDArray[np.float32]:
     """(T, 7) the frame of each of (T, 3, 3) faces, see `NormalMap`."""
     chart = np.unique(atlas.chart, return_inverse=True)[1].ravel()
     count = int(chart.max(initial=-1)) + 1
-    normal = _units(np.stack([summed(chart, n, count) for n in normals(corner).T], axis=1), 2)
+    normal = _units(np.stack([sum_by_group(chart, n, count) for n in normals(corner).T], axis=1), 2)
     # The direction in which u grows, times twice the area of the face in the map.
     (au, av), (bu, bv) = np.moveaxis(atlas.uv[:, 1:] - atlas.uv[:, :1], 0, -1)
     along, up = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     turned = au * bv - av * bu
-    mirrored = summed(chart, turned, count) < 0
+    mirrored = sum_by_group(chart, turned, count) < 0
     way = (along.T * bv - up.T * av) * np.where(mirrored, -1, 1)[chart]
-    tangent = np.stack([summed(chart, part, count) for part in way], axis=1)
+    tangent = np.stack([sum_by_group(chart, part, count) for part in way], axis=1)
     tangent -= normal * (normal * tangent).sum(axis=1, keepdims=True)
     result = np.empty((count, 7))
     result[:, :3] = np.rint(normal / _STEP) * _STEP

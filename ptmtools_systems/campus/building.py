@@ -128,7 +128,7 @@ def make_campus(
         painted,
     )
     end("reading")
-    with FORM.staged(folder, force=force) as put:
+    with FORM.stage_files(folder, force=force) as put:
         textures = []
         limits = reading.limit << 20, options.quality
         for done, written in enumerate(executor.each(texture_files, limits, bases)):

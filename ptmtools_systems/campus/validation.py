@@ -83,7 +83,7 @@ class _Check:
     def _references(self, campus: Campus) -> None:
         """The materials that objects name, and the textures of materials and lightmaps, exist; no
         two files have one name."""
-        at = self.findings.at(INDEX)
+        at = self.findings.place(INDEX)
         files = [file.file for each in campus.objects for file in each.meshes]
         files += [each.record.file for each in campus.objects if each.record is not None]
         seen: set[str] = set()
@@ -138,7 +138,7 @@ class _Check:
         data = self._recorded(mesh)
         if data is None:
             return
-        at = self.findings.at(mesh.file)
+        at = self.findings.place(mesh.file)
         try:
             primitives = read_mesh(data)
         except ValueError as fault:
@@ -153,7 +153,7 @@ class _Check:
             at.add("PTM-D804", "the materials do not match its object")
             return
         for part in primitives:
-            part_at = at.at(f"material {part.material}")
+            part_at = at.with_place(f"material {part.material}")
             textured = part.material < len(campus.materials) and (
                 campus.materials[part.material].base is not None
             )
@@ -173,7 +173,7 @@ class _Check:
         data = self._recorded(texture)
         if data is None:
             return
-        at = self.findings.at(texture.file)
+        at = self.findings.place(texture.file)
         if not data.startswith(b"\xff\xd8\xff"):
             at.add("PTM-D804", "is not a JPEG")
             return

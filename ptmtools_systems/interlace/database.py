@@ -89,7 +89,7 @@ def check_files(database: ServedDatabase) -> None:
         return
     template = hints.index.get("textureSets", {}).get(INTERLACED.name)
     if template is None:
-        database.at(HINTS, "textureSets").add(
+        database.place(HINTS, "textureSets").add(
             "PTM-D700", f"does not name {INTERLACED.name}, whose files exist"
         )
         return
@@ -103,4 +103,4 @@ def check_files(database: ServedDatabase) -> None:
     (folder,) = INTERLACED.owns
     sets = {p for p in database.files if p.startswith(folder) and p.endswith(f"/{INDEX}")}
     for path in sorted(sets - set(indices)):
-        database.at(path).add("PTM-D710", "belongs to no texture")
+        database.place(path).add("PTM-D710", "belongs to no texture")

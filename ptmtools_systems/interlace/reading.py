@@ -283,7 +283,7 @@ def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationRep
             raise
         findings.add("PTM-D800", INDEX, fault.place or "", fault.message)
         return ValidationReport(findings.issues(), files, 0)
-    _check_split(interlaced, findings.at(INDEX))
+    _check_split(interlaced, findings.place(INDEX))
     decoded = True
     try:
         check_joined(interlaced, len(interlaced.parts), limits, folder)
@@ -291,7 +291,7 @@ def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationRep
         findings.add("PTM-D713", INDEX, "", fault.message)
         decoded = False
     for part in interlaced.parts:
-        length = _check_part(folder, interlaced, part, decoded, findings.at(part.name))
+        length = _check_part(folder, interlaced, part, decoded, findings.place(part.name))
         size += length
         files += length > 0
     listed = {INDEX, *(part.name for part in interlaced.parts)}

@@ -27,7 +27,7 @@ from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.planar import intersection, neighbours, union
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.orientation.main_axes import main_axes
-from ptmtools.tolerance import ranked
+from ptmtools.tolerance import rank
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -298,8 +298,8 @@ def test_equal_values_go_by_index() -> None:
     values = np.repeat([4.0, 4.0 + 1e-5, 1.0, 0.0], 5)[rng.permutation(20)]
     noisy = values * (1 + 1e-8 * rng.uniform(-1, 1, 20))
     expected = np.lexsort((np.arange(20), -values))
-    assert np.array_equal(ranked(noisy), expected)
-    assert len(ranked(np.zeros(0))) == 0
+    assert np.array_equal(rank(noisy), expected)
+    assert len(rank(np.zeros(0))) == 0
 
 
 def test_an_intersection_that_floating_point_loses() -> None:

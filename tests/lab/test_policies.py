@@ -23,7 +23,7 @@ def declare(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
 
     def clear() -> None:
         plugins.points.cache_clear()
-        plugins.declared.cache_clear()
+        plugins.declarations.cache_clear()
 
     def put(name: str) -> None:
         clear()

@@ -264,7 +264,7 @@ def seen_from(world: World, eye: tuple[float, ...], at: tuple[float, ...]) -> Wo
 
     def change(w: World) -> World:
         place = (eye - origin)[None]
-        cell = w.served.locator.along(place)
+        cell = w.served.locator.cells_along(place)
         track = w.track.looking(slice(1))
         return replace(w, track=replace(track, eye=place, direction=direction[None], cell=cell))
 

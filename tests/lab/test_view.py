@@ -324,8 +324,8 @@ def test_the_cell_of_each_eye(seed: int) -> None:
     inside &= (local[:, 0] > bounds[0]) & (local[:, 0] < bounds[-1])
     expected = np.where(inside, np.searchsorted(bounds, local[:, 0]) - 1, -1)
     locator = Locator(records)
-    assert locator.along(local @ axes).tolist() == expected.tolist()
+    assert locator.cells_along(local @ axes).tolist() == expected.tolist()
     for start in (0, 1):
         first = np.array([bounds[start : start + 2].mean(), 1, 1])
         wall = np.array([bounds[1], 1, 1])
-        assert locator.along(np.array([first, wall]) @ axes).tolist() == [start, start]
+        assert locator.cells_along(np.array([first, wall]) @ axes).tolist() == [start, start]

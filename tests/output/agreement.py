@@ -18,7 +18,7 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.output.gltf import WRAPS, linear
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
-from ptmtools.output.gltf_shapes import flipped
+from ptmtools.output.gltf_shapes import flip_v
 from ptmtools.output.grid import COARSEST, MOST
 from ptmtools.output.model import FileError
 from ptmtools.scene.colors import to_srgb
@@ -252,7 +252,7 @@ def _shapes(name: str, glb: ReadGlb, shapes: Sequence[VrmlNode]) -> Iterator[str
         unmapped = "texCoord" not in shape.at("geometry")
         uv = primitive.uv
         if mapped is not None and uv is not None:
-            mapped = flipped(mapped.astype(np.float32))
+            mapped = flip_v(mapped.astype(np.float32))
         elif (mapped is not None or unmapped) and (uv is not None or not unmapped):
             yield f"triangles: {name}: {primitive.place}, texture coordinates"
             continue

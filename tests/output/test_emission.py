@@ -23,7 +23,7 @@ from ptmtools.output import (
     emit,
     validate_database,
 )
-from ptmtools.output.emission import compressed
+from ptmtools.output.emission import compress
 from ptmtools.output.names import DefNames
 from ptmtools.scene.model import Material
 from ptmtools.texture.model import Level
@@ -198,7 +198,7 @@ def test_a_file_that_cannot_be_written(artifacts, tmp_path: Path, name: str, ent
 
 def test_compressing_nothing_and_much() -> None:
     for data in (b"", bytes(3_000_000), os.urandom(100_000)):
-        assert gzip.decompress(compressed(data)) == data
+        assert gzip.decompress(compress(data)) == data
 
 
 def test_the_level_of_the_fallback_image(artifacts, tmp_path: Path) -> None:

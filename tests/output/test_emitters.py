@@ -44,7 +44,7 @@ def read_toy(path: str, data: bytes) -> int | None:
 def check_toy(database: ServedDatabase) -> None:
     cells = [path for path in database.contents if path.startswith("toys/")]
     if database.contents.get("toy.txt") != len(cells):
-        database.at("toy.txt").add("PTM-D699", "counts other cells than there are")
+        database.place("toy.txt").add("PTM-D699", "counts other cells than there are")
 
 
 @pytest.fixture

@@ -17,12 +17,12 @@ from ptmtools.output.vrml import (
     CELL,
     CELL_OF_LEAVES,
     HEADER,
-    chosen,
     declaration,
     field,
-    listed,
+    list_field,
     loops,
-    quoted,
+    rows_field,
+    sf_string,
 )
 from tests.output.vrml_reader import parse
 
@@ -155,8 +155,8 @@ def test_numbers_as_written() -> None:
 def test_rows_of_lists() -> None:
     rows = row_texts(np.array([[0, 1, 2], [0.5, -1, 1e7], [3, 3, 3]], np.float32))
     assert rows == ["0 1 2", "0.5 -1 1e7", "3 3 3"]
-    assert chosen(rows, np.array([2, 1, 0]), per_line=2) == "[ 3 3 3,0.5 -1 1e7\n0 1 2 ]"
-    assert chosen(rows, np.zeros(0, np.int64)) == "[ ]"
+    assert rows_field(rows, np.array([2, 1, 0]), per_line=2) == "[ 3 3 3,0.5 -1 1e7\n0 1 2 ]"
+    assert rows_field(rows, np.zeros(0, np.int64)) == "[ ]"
     assert row_texts(np.zeros((0, 3), np.float32)) == []
 
 
@@ -173,9 +173,9 @@ def test_not_finite_is_refused() -> None:
 
 
 def test_lists() -> None:
-    assert listed([], 3) == "[ ]"
-    assert listed("abc", 3) == "[ a, b, c ]"
-    assert listed("abcd", 3) == "[ a, b, c\nd ]"
+    assert list_field([], 3) == "[ ]"
+    assert list_field("abc", 3) == "[ a, b, c ]"
+    assert list_field("abcd", 3) == "[ a, b, c\nd ]"
 
 
 def document(body: str) -> bytes:
@@ -185,7 +185,7 @@ def document(body: str) -> bytes:
 @given(st.text())
 def test_strings_read_back(text: str) -> None:
     try:
-        data = document(f"WorldInfo {{ title {quoted(text)} }}")
+        data = document(f"WorldInfo {{ title {sf_string(text)} }}")
     except UnicodeEncodeError:
         return
     (node,) = parse(data).nodes

@@ -75,4 +75,4 @@ def test_how_fine_textures_are_needed(artifacts, tmp_path: Path, put_textures, s
     alone = Content(a.scene, a.cells, Pvs.from_matrix(np.eye(3, dtype=np.bool_)), a.ach, records)
     for cell in range(3):
         places = {place for place, *_ in RecordWriter(alone)._need(need, cell)}
-        assert places == set(alone.painted[cell].tolist())
+        assert places == set(alone.cell_textures[cell].tolist())

@@ -233,9 +233,9 @@ def test_the_floor_below(room_row, seed: int) -> None:
             if (abs(slope) if both else slope) > np.cos(np.pi / 4) and inside and height <= p[1]:
                 heights.append(height)
         wanted.append(max(heights))
-    np.testing.assert_allclose(FloorFinder(scene).below(points), wanted, atol=1e-9)
+    np.testing.assert_allclose(FloorFinder(scene).floor_below(points), wanted, atol=1e-9)
     assert np.isfinite(wanted).sum() > 5
-    assert FloorFinder(scene).below(points[:0]).shape == (0,)
+    assert FloorFinder(scene).floor_below(points[:0]).shape == (0,)
 
 
 @pytest.mark.parametrize("seed", range(3))

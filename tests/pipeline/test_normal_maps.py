@@ -92,7 +92,7 @@ def test_the_hints_and_the_cells_name_them(made: Path) -> None:
 
 def test_coordinates_survive_the_cells(made: Path) -> None:
     """Those of ceilings are metres."""
-    bumped = read_served(made / "db").surfaces.bumped
+    bumped = read_served(made / "db").surfaces.bump_surfaces
     assert bumped
     rows = index_of(made / "db")["textures"]
     own = bumped.texture == [row["file"] for row in rows].index("textures/waves.ptm")

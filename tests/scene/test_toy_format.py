@@ -31,10 +31,10 @@ def toy(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Mode
     if request.param == "row":
         monkeypatch.setitem(FORMATS, declared.name, declared)
     else:
-        others, rows = plugins.declared, {declared.name: declared}
+        others, rows = plugins.declarations, {declared.name: declared}
         monkeypatch.setattr(
             plugins,
-            "declared",
+            "declarations",
             lambda kind, cls: rows if kind == "formats" else others(kind, cls),
         )
     return declared

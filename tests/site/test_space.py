@@ -107,7 +107,7 @@ def test_the_cell_along_a_walk(tmp_path: Path, world: World) -> None:
     eyes = np.concatenate([world.track.eye, *ways])
     actual = located(tmp_path, world, eyes, every)
     cells = [cell for cell, _ in actual]
-    assert cells == world.served.locator.along(eyes).tolist()
+    assert cells == world.served.locator.cells_along(eyes).tolist()
     assert len(set(cells)) > 1
     assert not any(candidates for _, candidates in actual)
 
@@ -120,7 +120,7 @@ def test_the_cell_anywhere(tmp_path: Path, world: World) -> None:
     eyes = random.uniform(low, high, (400, 3))
     every = list(range(stock.cell_count))
     actual = [cell for cell, _ in located(tmp_path, world, eyes, every)]
-    outside = np.array([locator.outside(cell, eyes) for cell in every])
+    outside = np.array([locator.distance_outside(cell, eyes) for cell in every])
     for cell, far in zip(actual, outside.T, strict=True):
         assert far[cell] <= SLACK if cell >= 0 else (far > SLACK).all()
     assert len(set(actual)) > 2

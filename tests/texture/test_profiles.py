@@ -65,7 +65,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
 
     def forget() -> None:
         plugins.points.cache_clear()
-        plugins.declared.cache_clear()
+        plugins.declarations.cache_clear()
 
     def declare(**profiles: Profile) -> None:
         names = [

@@ -84,7 +84,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
     Raises InputError: PTM-I122 if it cannot be read. All other faults are in the report.
     """
     file, findings = Path(path), Findings(CODES)
-    at = findings.at(os.fspath(path))
+    at = findings.place(os.fspath(path))
     try:
         size = os.stat(file).st_size
         if size > limits.decoded_bytes:  # 0 for a pipe
@@ -128,7 +128,7 @@ class _DatabaseCheck:
         self.bytes = 0
         self._folder = folder
         self._limits = limits
-        self._manifest = self.findings.at(MANIFEST)
+        self._manifest = self.findings.place(MANIFEST)
         self._stages: dict[str, dict[str, Any]] = {}
         #: Name relative to the database → hash in the manifest.
         self._outputs: dict[str, str] = {}
@@ -146,21 +146,21 @@ class _DatabaseCheck:
         self._note_foreign([path for path in served if path not in ours])
         self._read_files(database, progress, workers)
         if _EMIT not in self._stages and not any(e.entry in ours for e in all_emitters()):
-            database.at(HINTS).add("PTM-D655", f"the stage `{_EMIT}` has not run")
+            database.place(HINTS).add("PTM-D655", f"the stage `{_EMIT}` has not run")
             return
         listed = {path for path in ours if f"{SERVED}/{path}" in self._outputs} or ours
         present = [e for e in all_emitters() if any(map(e.is_owner, listed))]
         for emitter in {*present, *self._emitters_to_expect(present)}:
             for name in emitter.owns:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):
-                    database.at(name).add("PTM-D651", "missing")
+                    database.place(name).add("PTM-D651", "missing")
         database.hints = gather(database)
         for emitter in present:
             if emitter.check:
                 emitter.check.load()(database)
         for path in sorted(ours - database.named):
             if path.partition("/")[0] in _stage_folders():
-                database.at(path).add("PTM-D677", "no other file names it")
+                database.place(path).add("PTM-D677", "no other file names it")
 
     def _read_manifest(self) -> None:
         try:
@@ -180,12 +180,12 @@ class _DatabaseCheck:
             for field in ("inputs", "outputs"):
                 record[field] = self._listed_files(record[field], field == "outputs")
         for stage, record in self._stages.items():
-            at = self._manifest.at(f"stages.{stage}")
+            at = self._manifest.with_place(f"stages.{stage}")
             for name in sorted(self._outputs.keys() & record["outputs"].keys()):
                 at.add("PTM-D650", f"another stage lists {name}, too")
             self._outputs |= record["outputs"]
         for stage, record in self._stages.items():
-            at = self._manifest.at(f"stages.{stage}")
+            at = self._manifest.with_place(f"stages.{stage}")
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
                     at.add("PTM-D656", f"computed from an earlier {name}")
@@ -210,7 +210,7 @@ class _DatabaseCheck:
                 fault = error.message if error.code == "PTM-D006" else ""
             if fault:
                 self._complete = False
-                self.findings.at(list_file(digest)).add("PTM-D650", fault)
+                self.findings.place(list_file(digest)).add("PTM-D650", fault)
         return listed
 
     def _is_ours(self, path: str) -> bool:
@@ -253,7 +253,7 @@ class _DatabaseCheck:
     def _read(self, name: str) -> _Reading:
         """Reads a file, named relative to the database; called from several threads."""
         findings = Findings(CODES)
-        reading, at = _Reading(findings), findings.at(name)
+        reading, at = _Reading(findings), findings.place(name)
         if name.startswith(f"{SERVED}/") and not self._is_served(name):
             # `served_files` has reported what exists and is no file.
             if not os.path.lexists(self._folder / name):

@@ -38,7 +38,7 @@ def served_files(folder: Path, findings: Findings) -> list[str]:
     """
     top = os.path.realpath(folder)
     if folder.is_symlink():
-        findings.at(SERVED).add("PTM-D657", f"is a link to {top}")
+        findings.place(SERVED).add("PTM-D657", f"is a link to {top}")
     files: list[str] = []
     folders = [""]
     while folders:
@@ -50,11 +50,11 @@ def served_files(folder: Path, findings: Findings) -> list[str]:
             continue
         except OSError as fault:
             message = f"cannot be read ({fault.strerror or fault})"
-            findings.at(f"{SERVED}/{below}").add("PTM-D651", message)
+            findings.place(f"{SERVED}/{below}").add("PTM-D651", message)
             continue
         for entry in entries:
             path = f"{below}{entry.name}"
-            at = findings.at(f"{SERVED}/{path}")
+            at = findings.place(f"{SERVED}/{path}")
             target = os.path.realpath(entry.path) if entry.is_symlink() else top
             if not Path(target).is_relative_to(top):
                 at.add("PTM-D657", f"is a link to {os.readlink(entry.path)}")
@@ -87,7 +87,7 @@ def check_names(files: Iterable[str], findings: Findings) -> None:
             similar = known.setdefault(path.casefold(), path)
             if similar != path:
                 known[path.casefold()] = path
-                findings.at(f"{SERVED}/{path}").add("PTM-D675", f"there is {similar} too")
+                findings.place(f"{SERVED}/{path}").add("PTM-D675", f"there is {similar} too")
 
 
 def check_gzip(copy: bytes, original: bytes | None, at: Place) -> None:
@@ -128,13 +128,13 @@ class ReadHints:
     def urls(self, form: str) -> list[str] | None:
         """The URLs of the cells' geometry in a form; None if the index does not name the form."""
         template: str | None = self.index["geometry"].get(form)
-        return None if template is None else self.expanded(template)
+        return None if template is None else self.cell_urls(template)
 
-    def expanded(self, template: str) -> list[str]:
+    def cell_urls(self, template: str) -> list[str]:
         """The URLs of the cells by a template."""
         return [template.replace("{name}", cell["name"]) for cell in self.index["cells"]]
 
-    def known(self) -> Iterator[tuple[int, Row]]:
+    def usable_records(self) -> Iterator[tuple[int, Row]]:
         """The usable records with their cells' numbers."""
         return ((i, record) for i, record in enumerate(self.records) if record is not None)
 
@@ -173,9 +173,9 @@ class ServedDatabase:
         """Adds the issues of a folder in the served one that was checked by itself."""
         self._findings.take(replace(i, file=f"{SERVED}/{path}{i.file}") for i in issues)
 
-    def at(self, path: str, place: str = "") -> Place:
+    def place(self, path: str, place: str = "") -> Place:
         """A place in a served file, to report issues there."""
-        return self._findings.at(f"{SERVED}/{path}", place)
+        return self._findings.place(f"{SERVED}/{path}", place)
 
     def head(self, path: str, length: int) -> bytes:
         """At most ``length`` first bytes of a served file; empty if it cannot be read."""
@@ -193,7 +193,7 @@ class ServedDatabase:
             self._known[key] = self._find_file(*key)
         file, fault = self._known[key]
         if fault:
-            self.at(path, url).add("PTM-D671", fault)
+            self.place(path, url).add("PTM-D671", fault)
             return None
         self.named.add(file)
         return file
@@ -203,7 +203,7 @@ class ServedDatabase:
         files = [self.resolve(path, url) for url in urls]
         for file, count in Counter(files).items():
             if file is not None and count > 1:
-                self.at(path, place).add("PTM-D671", f"{file} is named {count} times")
+                self.place(path, place).add("PTM-D671", f"{file} is named {count} times")
         return files
 
     def _find_file(self, base: str, url: str) -> tuple[str, str]:

@@ -29,13 +29,13 @@ def check_files(database: ServedDatabase) -> None:
     expected = set(cell_of) if hints else present
     for path in sorted(expected ^ present):
         message = "is missing" if path in expected else "belongs to no cell and to no object"
-        database.at(path).add("PTM-D699", message)
+        database.place(path).add("PTM-D699", message)
     for path in sorted(present):
         glb: ReadGlb | None = database.contents.get(path)
         if glb is None:
             continue
         if glb.name != PurePosixPath(path).stem or glb.cell != cell_of.get(path, glb.cell):
-            database.at(path, "scene").add("PTM-D731", f"is named {glb.name!r}, cell {glb.cell}")
+            database.place(path, "scene").add("PTM-D731", f"is named {glb.name!r}, cell {glb.cell}")
         for material in dict.fromkeys(primitive.material for primitive in glb.primitives):
             for url in (material.image, material.ptm, material.lightmap, material.normal_map):
                 if url is not None:
@@ -43,7 +43,7 @@ def check_files(database: ServedDatabase) -> None:
         if hints is not None:
             faults = (f for p in glb.primitives for f in _faults(path, glb.cell, p, hints))
             for code, place, message in dict.fromkeys(faults):
-                database.at(path, place).add(code, message)
+                database.place(path, place).add(code, message)
 
 
 def _faults(

@@ -13,9 +13,9 @@ from ptmtools.diagnostics import Place
 from ptmtools.output.emitters import EMITTERS
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.mesh_levels import row_fault
-from ptmtools.output.model import FileError, shaped, sizes_of
+from ptmtools.output.model import FileError, convert_shape_errors, sizes_of
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
-from ptmtools.output.representation import listed
+from ptmtools.output.representation import representations_in
 from ptmtools.output.validation.files import ReadHints, Row, ServedDatabase
 from ptmtools.output.validation.textures import check_record
 
@@ -43,13 +43,13 @@ def read_file(path: str, data: bytes) -> Row | int | None:
 
 
 def _read(data: bytes, name: str) -> Row:
-    with shaped("PTM-D700"):
+    with convert_shape_errors("PTM-D700"):
         document = schemas.parse(data)
     number = document.get("schema") if isinstance(document, dict) else None
     if type(number) is int and number != SCHEMA:
         message = f"is {number}, this ptmtools reads {SCHEMA}; `ptm build-scene` writes it anew"
         raise FileError("PTM-D656", "schema", message)
-    with shaped("PTM-D700"):
+    with convert_shape_errors("PTM-D700"):
         schemas.check(document, name)
     hints: Row = document
     return hints
@@ -68,7 +68,7 @@ def gather(database: ServedDatabase) -> ReadHints | None:
     for i, path in enumerate(paths):
         record = database.contents.get(path) if path else None
         if record is not None and (fault := _record_fault(record, i, cells, len(textures))):
-            database.at(path or "", fault.place).add(fault.code, fault.message)
+            database.place(path or "", fault.place).add(fault.code, fault.message)
             record = None
         records.append(record)
     paths_or_urls = [path or url for path, url in zip(paths, urls, strict=True)]
@@ -80,24 +80,24 @@ def check_files(database: ServedDatabase) -> None:
     hints = database.hints
     if hints is None:
         return
-    index, at = hints.index, database.at(HINTS)
-    places = [database.at(path) for path in hints.paths]
+    index, at = hints.index, database.place(HINTS)
+    places = [database.place(path) for path in hints.paths]
     levels = [len(sizes_of(row)) for row in index["textures"]]
-    for i, record in hints.known():
+    for i, record in hints.usable_records():
         _check_record(record, i, levels, places[i])
     _check_textures(hints, database)
     for i, row in enumerate(database.contents.get(STATISTICS, {"cells": ()})["cells"]):
         if row["missed"] > _MISSED:
             message = f"{row['missed']:.3g} of the pixels fell on cells outside the PVS"
-            database.at(STATISTICS, f"cells[{i}]").add("PTM-D703", message)
+            database.place(STATISTICS, f"cells[{i}]").add("PTM-D703", message)
     _check_first_looks(hints, database)
-    for kind in listed(hints.index):
+    for kind in representations_in(hints.index):
         kind.check.load()(hints, database)
     _check_meshes(index, at)
     if not index["geometry"]:
         at.add("PTM-D700", "names no form", "geometry")
     for form, template in index["geometry"].items():
-        urls = hints.expanded(template)
+        urls = hints.cell_urls(template)
         if database.files.isdisjoint(urls):  # else the check of the form compares its files
             database.resolve_each(HINTS, "geometry", urls)
         elif form not in EMITTERS or not EMITTERS[form].is_owner(template):
@@ -169,13 +169,15 @@ def _check_record(record: Row, i: int, levels: Sequence[int], at: Place) -> None
 
 
 def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
-    used = {t for _, record in hints.known() for row in record["textures"][:1] for t in row}
+    used = {
+        t for _, record in hints.usable_records() for row in record["textures"][:1] for t in row
+    }
     used |= {t for t, row in enumerate(hints.index["textures"]) if row.get("normals")}
     complete = all(record is not None for record in hints.records)
     rows = hints.index["textures"]
     files = database.resolve_each(HINTS, "textures", [row["file"] for row in rows])
     for i, (row, file) in enumerate(zip(rows, files, strict=True)):
-        at = database.at(HINTS, f"textures[{i}]")
+        at = database.place(HINTS, f"textures[{i}]")
         if complete and i not in used:
             at.add("PTM-D708", f"no cell uses {row['file']}")
         urls = (row["fallback"], *(preview["file"] for preview in row.get("previews", ())))
@@ -188,10 +190,10 @@ def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
 def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
     """Compares the length of each bundle with the levels that its record lists."""
     template: str | None = hints.index.get("firstLook")
-    urls = hints.expanded(template) if template else []
+    urls = hints.cell_urls(template) if template else []
     ends = [[0, *row["ends"]] for row in hints.index["textures"]]
-    for i, record in hints.known():
-        at = database.at(hints.paths[i], "firstLook")
+    for i, record in hints.usable_records():
+        at = database.place(hints.paths[i], "firstLook")
         if (template is None) != ("firstLook" not in record):
             at.add("PTM-D704", "only one of the index and the record names a bundle")
             continue
@@ -208,4 +210,4 @@ def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
                 actual = database.contents.get(path, length)
                 if actual != length:
                     message = f"the bundle has {actual} bytes, its levels {length}"
-                    database.at(path).add("PTM-D704", message)
+                    database.place(path).add("PTM-D704", message)

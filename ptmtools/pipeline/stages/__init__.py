@@ -38,7 +38,7 @@ def __getattr__(name: str) -> Any:
 def _ordered() -> list[Stage[Any]]:
     """All stages, each after those that it depends on."""
     stages = list(_OWN)
-    for stage in plugins.declared("stages", Stage).values():
+    for stage in plugins.declarations("stages", Stage).values():
         needed = [*stage.sources(stage.options()), *stage.heeds]
         if stage.changes:
             needed = [stage.changes, *changes_before(stage, stage.changes)]

@@ -59,7 +59,9 @@ class EmissionJob(Job):
             light=light,
             represented=represented,
             need=self._need(scene, {record.image: record for record in images}),
-            map_need=self._need(places.painted(scene), dict(enumerate(maps))) if places else None,
+            map_need=self._need(places.scene_with_maps(scene), dict(enumerate(maps)))
+            if places
+            else None,
             force=True,
             progress=run.progress,
             workers=run.workers.executor.workers,
@@ -117,7 +119,7 @@ def lightmap_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord
 
 def representing() -> tuple[Stage[Any], ...]:
     """The stages of other packages that add representations of objects."""
-    declared = plugins.declared("stages", Stage).values()
+    declared = plugins.declarations("stages", Stage).values()
     return tuple(stage for stage in declared if stage.representation)
 
 

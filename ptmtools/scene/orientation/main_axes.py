@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.tolerance import PARALLEL_COSINE, Tolerance, ranked
+from ptmtools.tolerance import PARALLEL_COSINE, Tolerance, rank
 
 #: Number of the largest triangles whose normals are candidate directions.
 _CANDIDATES = 64
@@ -40,12 +40,12 @@ def main_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     areas = np.linalg.norm(normals, axis=1)
     positive = areas > 0
     normals, areas = normals[positive] / areas[positive, None], areas[positive]
-    candidates = normals[ranked(areas)[:_CANDIDATES]]
+    candidates = normals[rank(areas)[:_CANDIDATES]]
     weights = np.zeros(len(candidates))
     for first in range(0, len(areas), _BATCH):
         rows = slice(first, first + _BATCH)
         weights += areas[rows] @ (np.abs(normals[rows] @ candidates.T) >= PARALLEL_COSINE)
-    order = ranked(weights)
+    order = rank(weights)
     across = [i for i in order if abs(float(candidates[i] @ candidates[order[0]])) < _PERPENDICULAR]
     if not across:
         return np.eye(3)

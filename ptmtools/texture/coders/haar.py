@@ -50,7 +50,7 @@ def encode(level: Bytes, below: Bytes) -> bytes:
             bytes([flags]),
             *(np.packbits(bitmap, bitorder="little").tobytes() for bitmap in bitmaps),
             b"" if sent is None else sent[sent_mask(components)].astype("<i2").tobytes(),
-            *encode_symbols(sink, EDGE_TABLE, tables.built_in()),
+            *encode_symbols(sink, EDGE_TABLE, tables.built_in_family()),
         ]
     )
 
@@ -78,7 +78,7 @@ def decode(data: Data, below: Bytes, shape: Shape, version_1: bool = False) -> B
         sent[mask] = reader.numbers("<i2", int(mask.sum()))
         if int(np.abs(sent).max()) > WEIGHT_TOP:
             raise group_error("a weight is out of range")
-    frequency = tables.parse(reader, TABLES, tables.built_in(), version_1)
+    frequency = tables.parse(reader, TABLES, tables.built_in_family(), version_1)
     level = np.empty(shape, np.uint8)
     edge = level.size - 4 * below.size
     stream = read_stream(reader, max(below.shape[1], edge))

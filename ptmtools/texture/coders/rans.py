@@ -99,7 +99,7 @@ def family(rows: Iterable[Sequence[int]]) -> Family:
 
 
 @cache
-def built_in() -> Family:
+def built_in_family() -> Family:
     """The built-in tables of the coders of 8 bits.
 
     Weight of magnitude m: 2^24 at 0, then each times ρ = mean / (16 + mean) in 16 bits.

@@ -51,13 +51,13 @@ def new_texels(sink: Sink) -> int:
 
 def write(sink: Sink) -> bytes:
     """The group of these symbols."""
-    return b"".join(encode_symbols(sink, len(sink.counts), tables.built_in()))
+    return b"".join(encode_symbols(sink, len(sink.counts), tables.built_in_family()))
 
 
 def decode(data: Data, below: Bytes, shape: Shape) -> Bytes:
     """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
     reader = GroupReader(data)
-    frequency = tables.parse(reader, blocks.TABLES, tables.built_in())
+    frequency = tables.parse(reader, blocks.TABLES, tables.built_in_family())
     stream = read_stream(reader, kernels.MOST_SYMBOLS)
     escaped = len(stream.escapes)
     state = np.zeros(9, np.int64)

@@ -79,7 +79,7 @@ class Profiles(Mapping[str, Profile]):
     def __len__(self) -> int:
         return len(self.built_in) + len(self._plugins())
 
-    def numbered(self, number: int) -> Profile | None:
+    def by_number(self, number: int) -> Profile | None:
         """The profile with a number in files, or None."""
 
         def find(profiles: Mapping[str, Profile]) -> Profile | None:
@@ -90,7 +90,7 @@ class Profiles(Mapping[str, Profile]):
         return find(self.built_in) or find(self._plugins())
 
     def _plugins(self) -> Mapping[str, Profile]:
-        declarations = plugins.declared("profiles", Profile)
+        declarations = plugins.declarations("profiles", Profile)
         owners = {profile.number: name for name, profile in self.built_in.items()}
         for name, profile in declarations.items():
             if profile.name != name:

@@ -143,7 +143,7 @@ def test_arrays(mesh: Simple, made: NormalMap) -> None:
     assert np.array_equal(again.uv, made.uv)
     assert np.array_equal(again.frame, made.frame)
     assert again.side.tolist() == [len(made.texels)]
-    painted = again.painted(scene)
+    painted = again.scene_with_maps(scene)
     assert [m.image for m in painted.materials] == [-1, 0]
     assert painted.triangle_material.tolist() == [1] * len(mesh.triangles)
     for name, change in (
