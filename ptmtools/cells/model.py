@@ -349,11 +349,8 @@ class Cells:
         passage = stored.array("portal_passage", np.bool_, portals)
         if (passage[:-1] > passage[1:]).any():
             raise ValueError("portal_passage does not ascend")
-        if "eye_point" in arrays:
-            corners = stored.array("eye_point", np.float64, None, 3, finite=True)
-            eye_floor = corners[stored.indices("eye_floor", np.int32, None, 3, high=len(corners))]
-        else:  # of an earlier release
-            eye_floor = stored.array("eye_floor", np.float64, None, 3, 3, finite=True)
+        corners = stored.array("eye_point", np.float64, None, 3, finite=True)
+        eye_floor = corners[stored.indices("eye_floor", np.int32, None, 3, high=len(corners))]
         return Cells(
             node_plane=node_plane,
             node_child=node_child,

@@ -212,7 +212,6 @@ class WriterOptions:
         "and highest step, in metres. Default: the size of --walker, with the eyes at 0.94 times "
         "its height.",
         metavar="RADIUS,EYE,STEP",
-        default_before=(6, (0.25, 1.6, 0.75)),
     )
     field_of_view: float = option(
         1.1,
@@ -224,7 +223,6 @@ class WriterOptions:
         "auto",
         "Levels of detail of objects with thousands of triangles: auto (clients of the GLBs draw a "
         "simplified mesh first, and finer ones where the difference can be seen) or none.",
-        default_before=(13, "none"),
     )
     first_look: int = option(
         0,
@@ -236,7 +234,6 @@ class WriterOptions:
         16,
         "Number of sample points per cell for measuring the required resolution of each texture; "
         "0 omits this measurement.",
-        default_before=(8, 0),
     )
     gzip: bool = option(
         False,

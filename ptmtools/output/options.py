@@ -18,7 +18,6 @@ class EmitOptions(WriterOptions):
         "Formats to write",
         choices=EMITTERS,
         several=True,
-        default_before=(5, "vrml"),
         basic=True,
     )
 

@@ -22,7 +22,7 @@ from ptmtools.store.manifest import Manifest
 
 
 def build_command(db: str | PathLike[str]) -> str:
-    """The command for a database, also for one of an earlier schema; without the options that
+    """The command for a database, without the options that
     cannot be read."""
     manifest = last_manifest(Path(db)) or Manifest("")
     options = []

@@ -15,7 +15,6 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from ptmtools.errors import PtmError
-from ptmtools.options import option_of
 
 if TYPE_CHECKING:
     from ptmtools.store.folder import DatabaseFolder
@@ -78,8 +77,7 @@ def parameters(options: Any) -> dict[str, Any]:
 def options_of(kind: type[O], record: StageRecord) -> O:
     """Inverse of `parameters`: the options of the class ``kind`` that a record has.
 
-    Parameters without a field are ignored. A field without a parameter has its default, and so has
-    one whose parameter is the default of the record's recipe (`default_before`).
+    Parameters without a field are ignored. A field without a parameter has its default.
 
     Raises ValueError if the parameters are impossible.
     """
@@ -87,14 +85,8 @@ def options_of(kind: type[O], record: StageRecord) -> O:
     values: dict[str, Any] = {}
     try:
         for each in fields(typing.cast(Any, kind)):
-            names = (each.name, *(name.replace("-", "_") for name in option_of(each).was))
-            name = next((name for name in names if name in record.parameters), None)
-            if name is None or not each.compare:
-                continue
-            value = _restored(hints[each.name], record.parameters[name])
-            recipe, default = option_of(each).default_before or (0, None)
-            if record.recipe >= recipe or value != default:
-                values[each.name] = value
+            if each.name in record.parameters and each.compare:
+                values[each.name] = _restored(hints[each.name], record.parameters[each.name])
         return kind(**values)
     except (PtmError, AttributeError, LookupError, TypeError) as fault:
         raise ValueError(str(fault)) from fault
@@ -133,15 +125,10 @@ def reasons(
 ) -> tuple[str, ...]:
     """Why a stage with the record ``before`` has to do ``work``; empty if it is current.
     ``changed`` describes the change of its recipe."""
-    from ptmtools.store.manifest import SCHEMA
-
     if before is None:
         if lost := db.manifest.lost.get(stage):
             return (f"{lost} is missing or damaged",)
-        earlier = db.manifest.replaced
-        if earlier is None:
-            return NEVER_RUN
-        return (f"the database has schema {earlier}, this ptmtools writes {SCHEMA}",)
+        return NEVER_RUN
     lines = []
     if before.recipe != work.recipe:
         change = f": {changed}" if changed and before.recipe < work.recipe else ""

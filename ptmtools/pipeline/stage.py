@@ -48,8 +48,7 @@ class Stage(Generic[A]):
     recipe: a number that rises when the stage gives other bytes for the same inputs, so that a new
         release repeats only the stages that it changed.
     changed: the visible effect of the last rise of the recipe.
-    options: the frozen class of its options. A field's metadata may have ``default_before``: a
-        recipe, and the default before that.
+    options: the frozen class of its options.
     reads: the stages whose artifacts `compute` takes, in this order; a function of the options if
         it depends on them.
     before_changes: whether, with these options, it reads artifacts as they are before other stages

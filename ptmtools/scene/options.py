@@ -36,7 +36,6 @@ class IngestOptions:
         "draw",
         "Normal maps and bump maps of glTF and OBJ materials: draw (they are stored, and clients "
         "fetch them after the textures) or none.",
-        default_before=(9, "none"),
     )
     two_sided: bool = option(False, "Draw both sides of every face.")
     strict: bool = option(

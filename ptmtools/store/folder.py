@@ -13,7 +13,7 @@ from ptmtools.files import open_regular, real_folder, write_bytes
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
 from ptmtools.store.lists import ReadList, list_file, read_list
-from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest, listed_before
+from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -232,9 +232,7 @@ def read_manifest(folder: Path) -> Manifest | None:
 
 
 def last_manifest(folder: Path) -> Manifest | None:
-    """As `read_manifest`, also of an earlier schema, see `listed_before`; None if it is damaged."""
+    """As `read_manifest`; None if it is damaged."""
     with suppress(DatabaseError):
         return read_manifest(folder)
-    with suppress(OSError), open_regular(folder / MANIFEST) as stream:
-        return listed_before(stream.read())
     return None

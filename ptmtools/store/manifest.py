@@ -17,7 +17,7 @@
 Stages are sorted by name. It contains no time and no folder of the machine: the same model and
 options give the same manifest anywhere. A stage is current if recipe, parameters and inputs would
 be the same, and all its outputs exist. Instead of more than a thousand inputs or outputs there are
-the SHA-256 of lists of them (`lists`); schema 2 had no lists.
+the SHA-256 of lists of them (`lists`).
 """
 
 from __future__ import annotations
@@ -30,15 +30,13 @@ from os import PathLike
 from typing import Any, cast
 
 from ptmtools import schemas
-from ptmtools.errors import DatabaseError, Rebuild
+from ptmtools.errors import DatabaseError
 from ptmtools.files import leads_inside
 from ptmtools.store.layout import WRITTEN
 from ptmtools.store.lists import FileList, ReadList, in_lists, list_file, stored
 
 FORMAT = "ptmtools database"
 SCHEMA = 3
-#: The earlier schema that this one extends.
-_EXTENDED = 2
 
 #: Largest depth of nested lists and objects.
 _MAX_DEPTH = 16
@@ -93,14 +91,12 @@ class Manifest:
     ----------
     model: the file's name.
     stages: by name.
-    replaced: the earlier schema of this manifest, or of the one that it replaces; not written.
     lost: stages without a record because a list of their files is missing or damaged, with that
         list; not written.
     """
 
     model: str
     stages: Mapping[str, StageRecord] = field(default_factory=dict)
-    replaced: int | None = field(default=None, compare=False)
     lost: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def with_stages(self, records: Mapping[str, StageRecord]) -> Manifest:
@@ -167,16 +163,12 @@ class Manifest:
             raise DatabaseError(
                 "PTM-D001", "not a ptmtools database", file=file, remedy="use a database folder"
             )
-        document = as_current(document)
         if document.get("schema") != SCHEMA:
             raise DatabaseError(
                 "PTM-D003",
-                f"schema version {document.get('schema')!r}, "
-                f"this ptmtools reads {_EXTENDED} and {SCHEMA}",
+                f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
                 file=file,
-                remedy=Rebuild("build it again with {}, or use the ptmtools that wrote it")
-                if listed_before(data)
-                else "use the ptmtools that wrote it",
+                remedy="use the ptmtools that wrote it",
             )
         try:
             schemas.check(document, schemas.MANIFEST)
@@ -199,36 +191,9 @@ class Manifest:
         return Manifest(document["model"], stages)
 
 
-def as_current(document: dict[str, Any]) -> dict[str, Any]:
-    """A document of the schema that this one extends, as one of this schema; others unchanged."""
-    extended = type(document.get("schema")) is int and document["schema"] == _EXTENDED
-    return document | {"schema": SCHEMA} if extended else document
-
-
 def all_outputs(files: Mapping[str, str]) -> bool:
     """Whether all files are ones that stages write."""
     return all(digest and _is_output(name) for name, digest in files.items())
-
-
-def listed_before(data: bytes) -> Manifest | None:
-    """Reads a manifest of an earlier schema, its `replaced`; None if it is no such manifest.
-
-    It tells which files of the folder belong to the database, and how it was built: the records
-    have only outputs, without digests, and a recipe and parameters, both unchecked.
-    """
-    try:
-        document = json.loads(data)
-        schema, model = document["schema"], document["model"]
-        earlier = type(schema) is int and 0 < schema < _EXTENDED
-        if document["format"] != FORMAT or not earlier or not isinstance(model, str):
-            return None
-        records = {}
-        for name, stage in document["stages"].items():
-            outputs = {path: "" for path in stage["outputs"] if _is_output(path)}
-            records[name] = StageRecord(stage.get("recipe"), stage.get("parameters"), {}, outputs)
-        return Manifest(model, records, schema)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
 
 
 def _nested(value: object, deepest: int) -> bool:

@@ -45,7 +45,7 @@ from ptmtools.store.folder import damaged, last_manifest, lists_in, read_manifes
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.store.lists import read_list
 from ptmtools.store.lock import acquire
-from ptmtools.store.manifest import Manifest, listed_before
+from ptmtools.store.manifest import Manifest
 from ptmtools.store.objects import Headers, Objects, is_url, plain_path
 from ptmtools.store.transaction import recover, remove_former, remove_output
 
@@ -90,7 +90,7 @@ class RemoteDatabase:
     def fetch(self, *, new: bool = False, force: bool = False) -> None:
         """Brings the copy up to the state at the URL, unless it is that, or ahead of it: to read,
         all files; to build, the manifest and its lists, as far as they can be read. With ``new``
-        there need be no database, and one of an earlier schema counts as none.
+        there need be no database.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class RemoteDatabase:
             file = f"{self.url}/{MANIFEST}"
             manifest = Manifest.from_bytes(data, file=file, lists=self._list)
         except DatabaseError:
-            if not new or not (force or listed_before(data)):
+            if not new or not force:
                 raise
             return
         self._before = manifest, data

@@ -10,7 +10,7 @@ from threading import Lock
 
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.files import writing
-from ptmtools.store.folder import DatabaseFolder, last_manifest, read_manifest
+from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, MANIFEST, STAGING
 from ptmtools.store.lock import acquire
 from ptmtools.store.manifest import Manifest
@@ -113,17 +113,16 @@ class DatabaseWriter(DatabaseFolder):
 
 def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
     """The manifest that a build of ``model`` starts from (design, "Overwriting"): an empty one for
-    a new folder and for a database of an earlier schema.
+    a new folder.
 
     Raises as `DatabaseWriter.open_for_model`.
     """
     try:
         manifest = read_manifest(folder)
     except DatabaseError:
-        earlier = last_manifest(folder)
-        if not force and (earlier is None or earlier.model != model):
+        if not force:
             raise
-        return Manifest(model, replaced=earlier.replaced if earlier else None)
+        return Manifest(model)
     if manifest and manifest.model == model:
         return manifest
     if manifest and not force:

@@ -244,8 +244,7 @@ def _reads(options: ReplaceOptions) -> tuple[Stage[Any], ...]:
 
 
 def _summary(n: Mapping[str, Any]) -> str:
-    objects = n.get("objects", n["octrees"])  # missing in databases of earlier releases
-    if not objects:
+    if not (objects := n.get("objects")):
         return "no object replaced"
     octrees = f"; {count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
     return (

@@ -133,7 +133,7 @@ def write_manifest(db: Path) -> None:
     }
     document = {
         "format": "ptmtools database",
-        "schema": 2,
+        "schema": 3,
         "model": "rooms.obj",
         "stages": {
             name: {

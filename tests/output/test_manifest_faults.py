@@ -137,7 +137,7 @@ def test_files_that_are_not_served(database: Path, there: Damage, expected: set[
         b'{"stages": {"emit": {}}}',
         b"\xff",
         b"[" * 100_000,
-        b'{"format": "ptmtools database", "schema": 2, "model": "a", "stages": {}, "stages": {}}',
+        b'{"format": "ptmtools database", "schema": 3, "model": "a", "stages": {}, "stages": {}}',
     ],
 )
 def test_a_bad_manifest(database: Path, manifest: bytes | None) -> None:

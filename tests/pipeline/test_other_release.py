@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,6 @@ from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import CELLS, EMIT, PVS, SCENE, STAGES, TEXTURES
 from ptmtools.pipeline.status import database_status
-from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.manifest import SCHEMA
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
@@ -41,7 +38,6 @@ def test_another_recipe_is_out_of_date(db: Path, capsys: pytest.CaptureFixture[s
     manifest = json.loads((db / "manifest.json").read_bytes())
     record = manifest["stages"][CELLS.name]
     record["recipe"] -= 1
-    record["parameters"]["max_cells"] = record["parameters"].pop("max_leaves")
     (db / "manifest.json").write_text(json.dumps(manifest))
     states = {stage.stage: stage.state for stage in database_status(db).stages}
     assert states == dict.fromkeys(STAGES, "done") | {CELLS.name: "stale"}
@@ -80,7 +76,7 @@ def test_a_plan_without_an_image(db: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def aged(db: Path) -> None:
-    """As release 0.2 left it: hints of schema 1, VRML alone by default, other recipes."""
+    """As another release left it: hints of schema 1, VRML alone, other recipes."""
     manifest = json.loads((db / "manifest.json").read_bytes())
     stages = manifest["stages"]
     for stage in (SCENE, PVS, EMIT):
@@ -89,7 +85,6 @@ def aged(db: Path) -> None:
         del stages[SCENE.name]["counts"][name]
     emitted = stages[EMIT.name]
     emitted |= {"recipe": 4}
-    emitted["parameters"] |= {"format": "vrml", "avatar_size": [0.25, 1.6, 0.75]}
     del emitted["counts"]["visit"]
     for path in [p for p in emitted["outputs"] if p.startswith(("www/hints/", "www/gltf/"))]:
         del emitted["outputs"][path]
@@ -125,25 +120,9 @@ def test_every_command_names_what_brings_it_up_to_date(
     name, *options = command.split()
     assert main([name, str(db), *options]) == status
     printed = capsys.readouterr()
-    whole = f"`{COMMAND} {db} {OPTIONS}"  # and no --format: what was the default is not asked for
+    whole = f"`{COMMAND} {db} {OPTIONS}"
     assert any(f"{whole}{end}" in printed.out + printed.err for end in ("`", " --rebuild`"))
     assert "invalid counts" not in printed.out
-
-
-@pytest.mark.parametrize(
-    "command", ["info", "status", "validate", "plot -o plan.png", "emit", "tradeoff"]
-)
-def test_of_an_earlier_schema_too(
-    db: Path, capsys: pytest.CaptureFixture[str], monkeypatch, command: str
-) -> None:
-    monkeypatch.chdir(db.parent)
-    manifest = json.loads((db / "manifest.json").read_bytes())
-    (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
-    name, *options = command.split()
-    assert main([name, str(db), *options]) == 5
-    err = capsys.readouterr().err
-    assert "PTM-D003" in err
-    assert f"`{COMMAND} {db} {OPTIONS}`" in err
 
 
 def test_so_do_errors_of_what_is_missing(db: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -161,17 +140,6 @@ def test_so_do_errors_of_what_is_missing(db: Path, capsys: pytest.CaptureFixture
     assert f"run `{COMMAND} {db} {OPTIONS}` first" in err
 
 
-def test_a_manifest_of_an_earlier_schema_may_say_anything(
-    db: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    manifest = json.loads((db / "manifest.json").read_bytes())
-    manifest["stages"][CELLS.name] |= {"recipe": None, "parameters": 7}
-    del manifest["stages"][PVS.name]["recipe"]
-    (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
-    assert main(["ach", str(db)]) == 5
-    assert f"`{COMMAND} {db} --samples 8 --backend embree`" in capsys.readouterr().err
-
-
 def test_the_first_build_says_what_is_rebuilt_and_why(
     db: Path, built: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -183,30 +151,9 @@ def test_the_first_build_says_what_is_rebuilt_and_why(
     for before in (SCENE.recipe - 1, PVS.recipe - 1, 4):
         assert f"because this release computes it differently (recipe {before}" in printed
     assert "the hints hold the previews of textures" in printed
-    assert "because format: vrml → vrml,gltf" in printed
     names = ("manifest.json", "www/hints.json", "www/hints/c0000.json", "www/gltf/c0000.glb")
     assert all((db / name).read_bytes() == (built / name).read_bytes() for name in names)
     assert main(["validate", str(db), "--strict"]) == 0
-    capsys.readouterr()
-
-    manifest = json.loads((db / "manifest.json").read_bytes())
-    (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
-    assert main(build) == 0
-    printed = capsys.readouterr().out
-    # The light is reported, too: there is none, because it would be too large.
-    reported = 1 + sum(not stage.optional for stage in STAGES.values())
-    reason = f"because the database has schema 1, this ptmtools writes {SCHEMA}"
-    assert printed.count(reason) == reported
-    assert (db / "manifest.json").read_bytes() == (built / "manifest.json").read_bytes()
-
-
-def test_a_format_that_was_asked_for_is_kept(db: Path) -> None:
-    record = DatabaseFolder.open(db).record(EMIT.name)
-    chosen = replace(record, parameters={**record.parameters, "format": "vrml"})
-    assert EMIT.recorded(chosen).format == "vrml"
-    assert EMIT.recorded(replace(chosen, recipe=4)).format == "vrml,gltf", "the default then"
-    both = replace(record, recipe=4)
-    assert EMIT.recorded(both).format == "vrml,gltf"
 
 
 @pytest.mark.parametrize(

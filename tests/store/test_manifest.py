@@ -38,13 +38,6 @@ def test_reads_one_of_an_earlier_release() -> None:
     assert again.stages["cells"].warnings == []
 
 
-def test_reads_one_of_the_earlier_schema() -> None:
-    """Which had no lists."""
-    earlier = json.dumps(document() | {"schema": 2}).encode()
-    again = Manifest.from_bytes(earlier, file="manifest.json")
-    assert again.to_bytes() == Manifest("m.obj", {"cells": RECORD}).to_bytes()
-
-
 def test_the_order_of_inputs_does_not_show() -> None:
     turned = StageRecord(
         1, RECORD.parameters, {"a": DIGEST, "b": ""}, RECORD.outputs, RECORD.counts, []

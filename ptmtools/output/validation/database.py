@@ -38,7 +38,7 @@ from ptmtools.quantities import count
 from ptmtools.store.folder import lists_in
 from ptmtools.store.layout import MANIFEST, SERVED, WRITTEN
 from ptmtools.store.lists import list_file
-from ptmtools.store.manifest import all_outputs, as_current
+from ptmtools.store.manifest import all_outputs
 from ptmtools.texture.model import Limits
 
 #: Foreign files listed by name in a note.
@@ -166,8 +166,6 @@ class _DatabaseCheck:
         try:
             with open_regular(self._folder / MANIFEST) as file:
                 document = schemas.parse(file.read())
-            if isinstance(document, dict):
-                document = as_current(document)
             schemas.check(document, schemas.MANIFEST)
             self._stages = document["stages"]
         except FileNotFoundError:

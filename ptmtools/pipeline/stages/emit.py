@@ -181,17 +181,13 @@ def read_records(
 
 
 def _summary(n: Mapping[str, Any]) -> str:
-    of = ""
-    if "owners" in n:  # missing in databases of earlier releases
-        of = (
-            f" in all cells, from {n['visible']:,} of the model ({n['owners']:,} if none were cut "
-            "at cell boundaries)"
-        )
     looks = n.get("first_look")
     bundles = f" ({size(looks)} of first-look bundles)" if looks else ""
     return (
         f"{count(n['files'], 'file')}, {size(n['bytes'])}{bundles}; "
-        f"{count(n['triangles'], 'triangle')}{of}, {count(n['viewpoints'], 'viewpoint')}"
+        f"{count(n['triangles'], 'triangle')} in all cells, from {n['visible']:,} of the model "
+        f"({n['owners']:,} if none were cut at cell boundaries), "
+        f"{count(n['viewpoints'], 'viewpoint')}"
     )
 
 

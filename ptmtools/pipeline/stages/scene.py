@@ -338,14 +338,11 @@ def _counts(scene: Scene) -> Mapping[str, Any]:
 def _summary(n: Mapping[str, Any]) -> str:
     guessed = [text for text, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]]
     how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
-    extent = ""
-    if "size" in n:  # absent from databases of earlier releases
-        width, height, depth = n["size"]
-        extent = f"; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
+    width, height, depth = n["size"]
     return (
         f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
         f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {str(n['up']).upper()} up"
-        f"{how}{extent}"
+        f"{how}; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
     )
 
 

@@ -459,7 +459,7 @@ def _summary(n: Mapping[str, Any]) -> str:
     raw, stored = n["raw_bytes"], n["ptm_bytes"]
     share = f" ({stored / raw:.1%})" if raw else ""
     more = ""
-    if previews := n.get("preview_bytes"):  # absent from databases of earlier releases
+    if previews := n.get("preview_bytes"):
         more = f"; previews {size(previews)}"
         if kept := n["kept_sources"]:
             more += f", of which {count(kept, 'lossy image')} of the model"
