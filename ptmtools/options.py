@@ -20,7 +20,7 @@ _KEY = "option"
 
 
 @dataclass(frozen=True)
-class Option:
+class OptionDeclaration:
     """The metadata of a field.
 
     Attributes
@@ -34,9 +34,6 @@ class Option:
     several: one value consists of several choices, separated by commas.
     numbers: the counts of numbers, separated by commas, that one value may have, such as (3, 4).
     parse, print: convert the value of the command line to that of the field, and back.
-    was: former names, which still work, with a note.
-    deprecated: the reason why it has no effect; the option is hidden.
-    default_before: (recipe of the stage, default of databases that an earlier recipe made).
     """
 
     help: str = ""
@@ -49,22 +46,21 @@ class Option:
     numbers: tuple[int, ...] = ()
     parse: Callable[[Any], Any] | None = None
     print: Callable[[Any], Any] | None = None
-    was: tuple[str, ...] = ()
-    deprecated: str = ""
-    default_before: tuple[int, Any] | None = None
 
 
 def option(default: Any, help: str, *, compare: bool = True, **details: Any) -> Any:
-    """A dataclass field with a default and an `Option`; ``details`` are attributes of that.
+    """A dataclass field with a default; ``details`` are attributes of its `OptionDeclaration`.
 
     With ``compare=False`` the option does not change what a stage computes.
     """
-    return field(default=default, compare=compare, metadata={_KEY: Option(help, **details)})
+    return field(
+        default=default, compare=compare, metadata={_KEY: OptionDeclaration(help, **details)}
+    )
 
 
-def option_of(field: Field[Any]) -> Option:
+def option_of(field: Field[Any]) -> OptionDeclaration:
     """The metadata of a field; empty if it was not declared by `option`."""
-    own: Option = field.metadata.get(_KEY, Option())
+    own: OptionDeclaration = field.metadata.get(_KEY, OptionDeclaration())
     return own
 
 
@@ -85,7 +81,7 @@ def arguments(options: Iterable[Any]) -> list[str]:
     for each in options:
         for own in fields(each):
             value, name, about = getattr(each, own.name), option_name(own), option_of(own)
-            if value == default_of(own) or about.deprecated:
+            if value == default_of(own):
                 continue
             if about.print:
                 value = about.print(value)

@@ -73,7 +73,6 @@ class SubdivideOptions:
     max_leaves: int = option(
         50_000,
         "Maximum number of leaves. The most useful divisions are made first.",
-        was=("max-cells",),
     )
     structural: tuple[str, ...] = option(
         (),

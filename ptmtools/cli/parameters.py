@@ -22,7 +22,7 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ptmtools.cli.console import Console
-from ptmtools.options import Option as Declared, default_of, degrees_text, option_name, option_of
+from ptmtools.options import OptionDeclaration, default_of, degrees_text, option_name, option_of
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
@@ -223,8 +223,6 @@ def options_of(
     ones only, with ``hidden``, none. Fields of several classes that have the same option share
     it."""
     options: dict[str, Decorator] = {}
-    former: dict[str, str] = {}
-    deprecated: dict[str, tuple[Any, str]] = {}
     for cls in classes:
         hints, heading = typing.get_type_hints(cls), getattr(cls, "heading", "Options")
         for field in fields(cls):
@@ -234,33 +232,11 @@ def options_of(
             settings: dict[str, Any] = {"heading": heading, "hidden": hidden}
             settings["basic"] = about.basic or not layered
             options[name] = _option(field, hints[field.name], **settings)
-            if about.deprecated:
-                deprecated[name] = default_of(field), about.deprecated
-            for old in about.was:
-                options[old] = _option(field, hints[field.name], former=old)
-                former[old] = name
 
     def decorate(function: Function) -> Function:
-        @wraps(function)
-        def renamed(*arguments: Any, **values: Any) -> Any:
-            for old, new in former.items():
-                given = values.pop(_variable(old))
-                if given not in (None, ()):
-                    source = click.get_current_context().get_parameter_source(_variable(new))
-                    if source == ParameterSource.COMMANDLINE:
-                        raise click.UsageError(f"--{old} is now called --{new}; use one of them")
-                    click.echo(f"ptm: note: --{old} is now called --{new}", err=True)
-                    values[_variable(new)] = given
-            for name, (default, reason) in deprecated.items():
-                if values[_variable(name)] != default:
-                    word = f"no-{name}" if default is True else name
-                    click.echo(f"ptm: note: --{word} has no effect any more: {reason}", err=True)
-            return function(*arguments, **values)
-
-        command: Function = renamed
-        for each in reversed(options.values()):
-            command = each(command)
-        return command
+        for add_option in reversed(options.values()):
+            function = add_option(function)
+        return function
 
     return decorate
 
@@ -293,17 +269,10 @@ def _variable(option: str) -> str:
     return option.replace("-", "_")
 
 
-def _option(field: Field[Any], hint: Any, *, former: str = "", **settings: Any) -> Decorator:
-    """The option of a field; with ``former`` the hidden one of that name, without a default."""
-    default = None if former else default_of(field)
-    about, name = option_of(field), former or option_name(field)
-    settings |= {
-        "default": default,
-        "help": f"Now --{option_name(field)}." if former else about.help,
-        "metavar": about.metavar or None,
-    }
-    if former or about.deprecated:
-        settings["hidden"] = True
+def _option(field: Field[Any], hint: Any, **settings: Any) -> Decorator:
+    """The option of a field."""
+    default, about, name = default_of(field), option_of(field), option_name(field)
+    settings |= {"default": default, "help": about.help, "metavar": about.metavar or None}
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if hint is bool:
@@ -314,7 +283,7 @@ def _option(field: Field[Any], hint: Any, *, former: str = "", **settings: Any) 
     return option(f"--{name}", _variable(name), **settings)
 
 
-def _typed(about: Declared, hint: Any) -> dict[str, Any]:
+def _typed(about: OptionDeclaration, hint: Any) -> dict[str, Any]:
     """The settings of an option that follow from its declaration and the type of the field."""
     if about.choices is not None:
         named = Named(about.choices, several=about.several)

@@ -35,18 +35,9 @@ class PvsOptions:
         "most this share, as random lines show; 0 always searches.",
         name="pvs-gain",
         metavar="SHARE",
-        default_before=(7, 0.0),
     )
     lines: int = option(
         1000, "Number of random lines through each portal, with --pvs sampled.", name="pvs-lines"
-    )
-    exact: bool = option(
-        True,
-        "No effect: lines of sight too thin for floating point are always decided exactly.",
-        name="pvs-exact",
-        compare=False,
-        deprecated="lines of sight too thin for floating point are always decided in higher "
-        "precision",
     )
 
     def __post_init__(self) -> None:

@@ -35,7 +35,7 @@ class Base:
 @dataclass(frozen=True)
 class Options(Base):
     kind: Literal["a", "b"] = option("a", "Kind of it.", basic=True)
-    names: tuple[str, ...] = option((), "Names.", was=("titles",))
+    names: tuple[str, ...] = option((), "Names.")
     places: tuple[tuple[float, float, float], ...] = ()
     eye: tuple[float, ...] | None = option(None, "Eye.", numbers=(3, 4))
     angle: float = option(1.0472, "Angle of it.", metavar="DEGREES", degrees=True)
@@ -50,11 +50,10 @@ class Options(Base):
         ([], Options()),
         (["--kind", "b", "--depth", "2", "--quick"], Options(2.0, "b", quick=True)),
         (["--names", "x", "--names", "y", "--seed", "7"], Options(names=("x", "y"), seed=7)),
-        (["--titles", "x", "--no-tidy"], Options(names=("x",), tidy=False)),
+        (["--names", "x", "--no-tidy"], Options(names=("x",), tidy=False)),
         (["--places", "1,2,-3.5"], Options(places=((1.0, 2.0, -3.5),))),
         (["--eye", "1,2,3,90"], Options(eye=(1.0, 2.0, 3.0, 90.0))),
         (["--angle", "90"], Options(angle=math.pi / 2)),
-        (["--titles", "x", "--names", "y"], None),
         (["--eye", "1,2"], None),
         (["--angle", "wide"], None),
         (["--kind", "c"], None),

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.cells.model import Cells
-from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.parallel import Local
 from ptmtools.portal_flow.flow import Portals, portal_flow
@@ -266,10 +265,3 @@ def test_progress_is_reported(build_rooms):
     steps = []
     compute_pvs(build_rooms(*ROW, ZIGZAG).cells, progress=lambda *step: steps.append(step))
     assert steps[-1] == (6, 6, "portals")
-
-
-def test_the_deprecated_option_is_accepted_with_a_note(tmp_path, capsys):
-    assert PvsOptions(exact=False) == PvsOptions()
-    for option, noted in (("--no-pvs-exact", True), ("--pvs-exact", False)):
-        main(["pvs", str(tmp_path), option])
-        assert ("--no-pvs-exact has no effect any more" in capsys.readouterr().err) is noted
