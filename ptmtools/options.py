@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import Any, get_args, get_origin
 
+from ptmtools.errors import InputError
+
 _KEY = "option"
 
 
@@ -49,13 +51,31 @@ class OptionDeclaration:
 
 
 def option(default: Any, help: str, *, compare: bool = True, **details: Any) -> Any:
-    """A dataclass field with a default; ``details`` are attributes of its `OptionDeclaration`.
-
-    With ``compare=False`` the option does not change what a stage computes.
-    """
+    """A dataclass field with a default; ``details`` are attributes of its `OptionDeclaration`. With
+    ``compare=False`` the option does not change what a stage computes."""
     return field(
         default=default, compare=compare, metadata={_KEY: OptionDeclaration(help, **details)}
     )
+
+
+def require(*rules: tuple[bool, str, str | None]) -> None:
+    """Raises InputError PTM-I111 for the first rule (holds, fault, remedy) that does not hold."""
+    for holds, fault, remedy in rules:
+        if not holds:
+            raise InputError("PTM-I111", fault, remedy=remedy)
+
+
+def require_ranges(
+    options: Any, ranges: Mapping[str, tuple[float, float]], fault: str, remedy: str = ""
+) -> None:
+    """As `require`, for fields between two numbers or at their defaults. The texts have in braces
+    ``least`` and ``most``, the option's ``name``, the ``field`` in words and its ``value``."""
+    for key, (least, most) in ranges.items():
+        value = getattr(options, key)
+        if value is not getattr(type(options), key) and not least <= value <= most:
+            words: dict[str, Any] = {"value": value, "least": least, "most": most}
+            words |= {"name": key.replace("_", "-"), "field": key.replace("_", " ")}
+            require((False, fault.format(**words), remedy.format(**words) or None))
 
 
 def option_of(field: Field[Any]) -> OptionDeclaration:

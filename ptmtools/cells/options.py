@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple, get_args
 
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require
 
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
@@ -155,7 +154,7 @@ class SubdivideOptions:
 
     def __post_init__(self) -> None:
         area, thickness, gain = self.wall_area, self.wall_thickness, self.gain
-        for sound, fault, remedy in (
+        require(
             (area > 0, f"wall area {area:g} m² is not positive", "try 2"),
             (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
             (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
@@ -181,6 +180,4 @@ class SubdivideOptions:
             (self.spaces in get_args(SpacesKind), f"no spaces {self.spaces!r}", "auto or none"),
             (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),
             (self.max_leaves >= 1, f"at most {self.max_leaves} leaves is too few", "try 500"),
-        ):
-            if not sound:
-                raise InputError("PTM-I111", fault, remedy=remedy)
+        )

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 from ptmtools.coverage.backends import AUTO, CHOICES
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require, require_ranges
 
 Preset = Literal["paper", "fast", "default", "high"]
 Placement = Literal["sobol", "kd", "uniform"]
@@ -91,22 +90,40 @@ class AchOptions:
             ("weighting", self.weighting, get_args(Weighting)),
             ("placement", self.placement or "sobol", get_args(Placement)),
         ):
-            if choice not in known:
-                raise _option_error(f"unknown {name} '{choice}'", f"one of {', '.join(known)}")
-        for name, value, low, high in (
-            ("samples", self.points, 1, MAX_SAMPLES),
-            ("face", self.side, 1, MAX_FACE),
-            ("seed", self.seed, 0, 2**32 - 1),
-            ("gpu", self.gpu or 0, 0, 255),
-        ):
-            if not low <= value <= high:
-                raise _option_error(f"{name} is {value}", f"use a number from {low} to {high}")
-        if self.clearance is not None and not 0 < self.clearance < float("inf"):
-            raise _option_error(
-                f"a clearance of {self.clearance} m is out of range", "use a distance above 0"
+            require((choice in known, f"unknown {name} '{choice}'", f"one of {', '.join(known)}"))
+        ranges = {
+            "samples": (1, MAX_SAMPLES),
+            "face": (1, MAX_FACE),
+            "seed": (0, 2**32 - 1),
+            "gpu": (0, 255),
+        }
+        require_ranges(self, ranges, "{name} is {value}", "use a number from {least} to {most}")
+        require(
+            (
+                self.clearance is None or 0 < self.clearance < float("inf"),
+                f"a clearance of {self.clearance} m is out of range",
+                "use a distance above 0",
             )
-        if self.tolerance is not None:
-            self._check_tolerance(self.tolerance)
+        )
+        if self.tolerance is None:
+            return
+        require(
+            (
+                0 < self.tolerance < 1,
+                f"a tolerance of {self.tolerance} is out of range",
+                "use a total variation above 0 and below 1, such as 0.01",
+            ),
+            (
+                self.points >= GROUPS,  # each group needs one
+                f"{self.points} sample points are too few to estimate their error",
+                f"allow {GROUPS} or more, or omit --samples",
+            ),
+            (
+                self.chosen_placement != "kd",
+                "--tolerance adds points step by step, which --placement kd does not support",
+                "use --placement sobol",
+            ),
+        )
 
     @property
     def points(self) -> int:
@@ -124,24 +141,3 @@ class AchOptions:
     def chosen_placement(self) -> Placement:
         """Placement of the sample points."""
         return PRESETS[self.preset][2] if self.placement is None else self.placement
-
-    def _check_tolerance(self, tolerance: float) -> None:
-        if not 0 < tolerance < 1:
-            raise _option_error(
-                f"a tolerance of {tolerance} is out of range",
-                "use a total variation above 0 and below 1, such as 0.01",
-            )
-        if self.points < GROUPS:  # each group needs one
-            raise _option_error(
-                f"{self.points} sample points are too few to estimate their error",
-                f"allow {GROUPS} or more, or omit --samples",
-            )
-        if self.chosen_placement == "kd":
-            raise _option_error(
-                "--tolerance adds points step by step, which --placement kd does not support",
-                "use --placement sobol",
-            )
-
-
-def _option_error(problem: str, remedy: str) -> InputError:
-    return InputError("PTM-I111", problem, remedy=remedy)

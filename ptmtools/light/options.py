@@ -5,15 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require, require_ranges
 
-#: Option → (least, most).
-RANGES: dict[str, tuple[float, float]] = {
-    "density": (0.1, 1000.0),
-    "samples": (1, 4096),
-    "reach": (1e-3, 1e6),
-}
+#: Field → (least, most).
+RANGES = {"light_density": (0.1, 1000.0), "light_samples": (1, 4096), "light_reach": (1e-3, 1e6)}
 
 
 @dataclass(frozen=True)
@@ -39,18 +34,15 @@ class LightOptions:
     )
 
     def __post_init__(self) -> None:
-        for name, (low, high) in RANGES.items():
-            field, value = f"light_{name}", getattr(self, f"light_{name}")
-            if not low <= value <= high:
-                raise InputError(
-                    "PTM-I111",
-                    f"--light-{name} {value:g} is not possible",
-                    remedy=f"use {low:g} to {high:g}",
+        require_ranges(
+            self, RANGES, "--{name} {value:g} is not possible", "use {least:g} to {most:g}"
+        )
+        for field in RANGES:
+            used = ["auto", "bake"] + ["model"] * (field == "light_density")
+            require(
+                (
+                    self.light in used or getattr(self, field) == getattr(type(self), field),
+                    f"--{field.replace('_', '-')} does nothing with --light {self.light}",
+                    f"leave it out, or use --light {' or '.join(used)}",
                 )
-            used = ("auto", "bake") if name != "density" else ("auto", "bake", "model")
-            if self.light not in used and value != getattr(type(self), field):
-                raise InputError(
-                    "PTM-I111",
-                    f"--light-{name} does nothing with --light {self.light}",
-                    remedy=f"leave it out, or use --light {' or '.join(used)}",
-                )
+            )

@@ -125,7 +125,7 @@ class Artifacts:
     def outputs(self, stage: Stage[Any]) -> Mapping[str, str]:
         """The outputs of a stage: name → SHA-256; raises PTM-D004 if it has not run.
 
-        Databases of earlier releases lack optional stages, which wrote nothing.
+        Databases lack the optional stages of packages that were installed later.
         """
         if self._last(stage) is None and (stage.optional or self._planned):
             return {}

@@ -19,8 +19,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from ptmtools.errors import InputError, WorkerError, naming
-from ptmtools.options import option
+from ptmtools.errors import WorkerError, naming
+from ptmtools.options import option, require
 from ptmtools.store.layout import IMAGES, SERVED, STAGES_FOLDER, STAGING, sha256
 from ptmtools.texture.model import EncodeOptions
 from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
@@ -109,17 +109,10 @@ class TextureOptions(PreviewOptions, EncodeOptions):
 
         super().__post_init__()
         check_options(self)
-        possible = {
-            "trim_height": self.trim_height > 0,
-            "trim_fov": 0 < self.trim_fov < 180,
-            "trim_distance": 0 < self.trim_distance < math.inf,
-        }
-        for name in (name for name, fits in possible.items() if not fits):
-            raise InputError(
-                "PTM-I111",
-                f"{name} is {getattr(self, name):g}",
-                remedy="use a number above 0, and for an angle below 180",
-            )
+        for name, limit in (("height", math.inf), ("fov", 180), ("distance", math.inf)):
+            value = getattr(self, f"trim_{name}")
+            remedy = "use a number above 0, and for an angle below 180"
+            require((0 < value < limit, f"trim_{name} is {value:g}", remedy))
 
 
 @dataclass(frozen=True)

@@ -71,8 +71,8 @@ class Stage(Generic[A]):
     fits: for stages whose artifacts this one refers to: a function of both artifacts that returns
         the fault, or "".
     job: the class that runs it.
-    optional: it may have nothing to write. Then it is not reported; databases of earlier releases
-        lack its record.
+    optional: it may have nothing to write. Then it is not reported; databases from before its
+        package was installed lack its record.
     telling: whether a run of an optional stage that wrote nothing is reported all the same, from
         its counts.
     joined: it has no command of its own, and its outputs belong to those of the next stage: a model

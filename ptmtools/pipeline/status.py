@@ -116,7 +116,7 @@ def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
     if lost := db.manifest.lost.get(stage.name):
         return StageStatus(stage.name, "damaged", f"{lost} is missing or damaged", {}, 0, 0)
     if record is None:
-        # Databases of earlier releases lack optional stages, which wrote nothing.
+        # Databases lack the optional stages of packages that were installed later.
         later = list(STAGES)[list(STAGES).index(stage.name) + 1 :]
         done = stage.optional and any(name in db.manifest.stages for name in later)
         return StageStatus(stage.name, "done" if done else "not run", "", {}, 0, 0)

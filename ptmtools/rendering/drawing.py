@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require_ranges
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
 from ptmtools.rendering.light import as_bytes
@@ -69,17 +69,13 @@ class ViewOptions:
     )
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("width", 1, MAX_SIDE),
-            ("height", 1, MAX_SIDE),
-            ("max_side", 0, 1 << 16),
-            ("field_of_view", 1, 170),
-        ):
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise _option_error(
-                    f"--{name.replace('_', '-')} {value:g} is not between {low} and {high}"
-                )
+        ranges = {
+            "width": (1, MAX_SIDE),
+            "height": (1, MAX_SIDE),
+            "max_side": (0, 1 << 16),
+            "field_of_view": (1, 170),
+        }
+        require_ranges(self, ranges, "--{name} {value:g} is not between {least} and {most}")
         if self.eye and self.viewpoint is not None:
             raise _option_error("--viewpoint and --eye exclude each other", "use one of them")
         for name, place in (("eye", self.eye), ("look", self.look)):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require
 
 
 @dataclass(frozen=True)
@@ -52,14 +51,14 @@ class IngestOptions:
     )
 
     def __post_init__(self) -> None:
-        if self.up not in (None, "y", "z"):
-            raise InputError("PTM-I111", f"unknown up axis {self.up!r}", remedy="use y or z")
-        if self.limit < 1 or self.max_triangles < 1:
-            raise InputError(
-                "PTM-I111",
+        require(
+            (self.up in (None, "y", "z"), f"unknown up axis {self.up!r}", "use y or z"),
+            (
+                self.limit >= 1 and self.max_triangles >= 1,
                 "a limit is below 1",
-                remedy="use --limit and --max-triangles of 1 or more",
-            )
+                "use --limit and --max-triangles of 1 or more",
+            ),
+        )
         if self.unit is not None:
             from ptmtools.scene.orientation.space import parse_unit
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require
 
 
 @dataclass(frozen=True)
@@ -41,21 +40,21 @@ class PvsOptions:
     )
 
     def __post_init__(self) -> None:
-        if self.budget < 0:
-            raise InputError(
-                "PTM-I111",
+        method, lines = self.method, self.lines
+        require(
+            (
+                self.budget >= 0,
                 f"budget {self.budget} is out of range",
-                remedy="use a budget of at least 0",
-            )
-        if not 0 <= self.gain < 1:
-            raise InputError(
-                "PTM-I111",
+                "use a budget of at least 0",
+            ),
+            (
+                0 <= self.gain < 1,
                 f"--pvs-gain {self.gain:g} is out of range",
-                remedy="use a share of at least 0, below 1",
-            )
-        if self.method not in ("full", "fast", "sampled") or self.lines < 1:
-            raise InputError(
-                "PTM-I111",
-                f"visibility cannot be computed by method {self.method!r} with {self.lines} lines",
-                remedy="choose full, fast or sampled, and at least one line",
-            )
+                "use a share of at least 0, below 1",
+            ),
+            (
+                method in ("full", "fast", "sampled") and lines >= 1,
+                f"visibility cannot be computed by method {method!r} with {lines} lines",
+                "choose full, fast or sampled, and at least one line",
+            ),
+        )

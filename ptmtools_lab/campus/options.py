@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ptmtools.errors import InputError
 from ptmtools.link import Conditions, Trace
-from ptmtools.options import option
+from ptmtools.options import option, require
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
 from ptmtools_systems.campus.model import PRESETS, Quality
 
@@ -88,12 +87,8 @@ class CampusWalkOptions:
             ("threads", self.threads >= 1, "1 or more"),
             ("move", self.move >= 0, "0 or more"),
         ):
-            if not valid:
-                raise InputError(
-                    "PTM-I111",
-                    f"{name} of {getattr(self, name)} is out of range",
-                    remedy=f"use --{name} {wanted}",
-                )
+            text = f"{name} of {getattr(self, name)} is out of range"
+            require((valid, text, f"use --{name} {wanted}"))
 
     @property
     def qualities(self) -> list[Quality]:

@@ -33,9 +33,8 @@ from typing import ClassVar
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.errors import InputError
 from ptmtools.jit import kernel, plain_kernel
-from ptmtools.options import option
+from ptmtools.options import option, require
 from ptmtools.quantities import MemorySize, parse_memory
 from ptmtools.site.client import AHEAD, BEFORE
 from ptmtools_lab.client import Client, FileKind, Range
@@ -167,12 +166,9 @@ class PaperOptions:
     def __post_init__(self) -> None:
         self.memory  # noqa: B018 - raises for an unreadable amount
         for name in ("delta_t", "delta_t_static", "static_after"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(
-                    "PTM-I111",
-                    f"--{name.replace('_', '-')} {getattr(self, name):g} is out of range",
-                    remedy="use 0 or more, finite",
-                )
+            seconds = getattr(self, name)
+            text = f"--{name.replace('_', '-')} {seconds:g} is out of range"
+            require((0 <= seconds < math.inf, text, "use 0 or more, finite"))
 
     @property
     def memory(self) -> MemorySize | None:

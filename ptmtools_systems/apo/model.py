@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.options import option
-from ptmtools_systems.apo.options import RANGES, check_range
+from ptmtools_systems.apo.options import check_ranges
 
 #: Bits of the address of a child, which limit the number of texels.
 ADDRESS_BITS = 24
@@ -45,8 +45,7 @@ class ApoOptions:
     )
 
     def __post_init__(self) -> None:
-        for name in RANGES:
-            check_range(name, getattr(self, name))
+        check_ranges(self)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal
 
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, option_name, require, require_ranges
 
 #: Greatest depth: Morton codes of three times as many bits fit into 63.
 DEEPEST = 20
@@ -20,16 +19,14 @@ RANGES: dict[str, tuple[float, float]] = {
 }
 
 
-def check_range(name: str, value: float, prefix: str = "") -> None:
-    """Raises InputError PTM-I111 for a value out of range; the option on the command line is
-    ``prefix`` and its name."""
-    least, most = RANGES[name]
-    if not least <= value <= most:
-        raise InputError(
-            "PTM-I111",
-            f"--{prefix}{name.replace('_', '-')} {value:g} is not possible",
-            remedy=f"use {least:g} to {most:g}",
-        )
+def check_ranges(options: Any, prefix: str = "") -> None:
+    """Raises InputError PTM-I111 for a value out of range, of the fields with this prefix."""
+    ranges = {
+        prefix + name: range for name, range in RANGES.items() if hasattr(options, prefix + name)
+    }
+    require_ranges(
+        options, ranges, "--{name} {value:g} is not possible", "use {least:g} to {most:g}"
+    )
 
 
 @dataclass(frozen=True)
@@ -75,17 +72,12 @@ class ReplaceOptions:
     )
 
     def __post_init__(self) -> None:
-        for name in ("faces", "error", "depth", "density"):
-            check_range(name, getattr(self, f"apo_{name}"), "apo-")
-            if not self.apo and getattr(self, f"apo_{name}") != getattr(type(self), f"apo_{name}"):
-                raise InputError(
-                    "PTM-I111",
-                    f"--apo-{name} does nothing without --apo",
-                    remedy="specify the objects with --apo",
+        check_ranges(self, "apo_")
+        for field in fields(self):
+            require(
+                (
+                    bool(self.apo) or getattr(self, field.name) == field.default,
+                    f"--{option_name(field)} does nothing without --apo",
+                    "specify the objects with --apo",
                 )
-        if not self.apo and self.relief != type(self).relief:
-            raise InputError(
-                "PTM-I111",
-                "--relief does nothing without --apo",
-                remedy="specify the objects with --apo",
             )

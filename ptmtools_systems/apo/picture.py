@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.folder_kinds import FolderPicture
-from ptmtools.options import option
+from ptmtools.options import option, require_ranges
 from ptmtools.quantities import count
 from ptmtools_systems.apo.model import Octree
 from ptmtools_systems.apo.view import FIELD_OF_VIEW, Frame, Look, view_of
@@ -57,21 +57,16 @@ class RenderOptions:
     )
 
     def __post_init__(self) -> None:
-        for name, least, most in (
-            ("levels", 0, 64),
-            ("azimuth", -360, 360),
-            ("elevation", -90, 90),
-            ("distance", 0, 1e6),
-            ("field_of_view", 1, 150),
-            ("width", 1, WIDEST),
-            ("height", 1, WIDEST),
-        ):
-            value = getattr(self, name)
-            if value is not None and not least <= value <= most:
-                raise InputError(
-                    "PTM-I111",
-                    f"{name.replace('_', ' ')} {value:g} is not between {least:g} and {most:g}",
-                )
+        ranges = {
+            "levels": (0, 64),
+            "azimuth": (-360, 360),
+            "elevation": (-90, 90),
+            "distance": (0, 1e6),
+            "field_of_view": (1, 150),
+            "width": (1, WIDEST),
+            "height": (1, WIDEST),
+        }
+        require_ranges(self, ranges, "{field} {value:g} is not between {least:g} and {most:g}")
 
 
 def render(

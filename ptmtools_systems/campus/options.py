@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require
 
 #: Most levels of detail, and most rays for a point of a lightmap.
 MAX_LODS, MAX_SAMPLES = 8, 4096
@@ -63,9 +62,5 @@ class CampusOptions:
             ("reach", 1e-3 <= self.reach <= 1e6 or no_end, "0.001 to 1000000, or inf"),
             ("quality", 1 <= self.quality <= 95, "1 to 95"),
         ):
-            if not sound:
-                raise InputError(
-                    "PTM-I111",
-                    f"{name} of {getattr(self, name)} is out of range",
-                    remedy=f"use --{name} {wanted}",
-                )
+            text = f"{name} of {getattr(self, name)} is out of range"
+            require((sound, text, f"use --{name} {wanted}"))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from ptmtools.errors import InputError
-from ptmtools.options import option
+from ptmtools.options import option, require, require_ranges
 
 _SEED = "Seed of the random numbers; another value gives another model."
 _SEEDS = (0, 2**63)
@@ -22,13 +22,9 @@ class Ranged:
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     def __post_init__(self) -> None:
-        for name, (least, greatest) in self.ranges.items():
-            if not least <= (value := getattr(self, name)) <= greatest:
-                raise InputError(
-                    "PTM-I111",
-                    f"--{name.replace('_', '-')} {value} is not possible",
-                    remedy=f"use {least} to {greatest}",
-                )
+        require_ranges(
+            self, self.ranges, "--{name} {value} is not possible", "use {least} to {most}"
+        )
 
 
 @dataclass(frozen=True)
@@ -112,12 +108,9 @@ class StatueOptions(Ranged):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in self.only:
-            if name not in STATUES:
-                raise InputError(
-                    "PTM-I111",
-                    f"there is no statue {name!r}",
-                    remedy=f"choose {', '.join(STATUES)}",
-                )
+            require(
+                (name in STATUES, f"there is no statue {name!r}", f"choose {', '.join(STATUES)}")
+            )
 
 
 @dataclass(frozen=True)
