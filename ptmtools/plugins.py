@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ptmtools.errors import MissingComponentError
 
@@ -35,13 +35,21 @@ KINDS = (
 
 
 @cache
+def installed_points() -> Any:
+    """All entry points, of which ``select(group=…)`` returns some: a search for one group opens the
+    metadata of every package, too."""
+    return entry_points()
+
+
+@cache
 def points(kind: str) -> Mapping[str, EntryPoint]:
     """The entry points of a kind by name, in the order of their names.
 
     Raises MissingComponentError: PTM-M110 two packages declare the same name.
     """
     table: dict[str, EntryPoint] = {}
-    for point in sorted(entry_points(group=f"ptmtools.{kind}"), key=lambda point: point.name):
+    group = installed_points().select(group=f"ptmtools.{kind}")
+    for point in sorted(group, key=lambda point: point.name):
         other = table.setdefault(point.name, point)
         if other.value != point.value:
             raise MissingComponentError(

@@ -29,7 +29,7 @@ def declare(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
         clear()
         point = EntryPoint("mine", f"{__name__}:{name}", "ptmtools.policies")
         points = EntryPoints([point])
-        monkeypatch.setattr(plugins, "entry_points", lambda group: points.select(group=group))
+        monkeypatch.setattr(plugins, "installed_points", lambda: points)
 
     yield put
     monkeypatch.undo()

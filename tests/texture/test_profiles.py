@@ -61,7 +61,9 @@ Install = Callable[..., None]
 def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     """Replaces the installed profiles by others, each under its own name or another."""
 
-    real = plugins.entry_points
+    groups = [f"ptmtools.{kind}" for kind in plugins.KINDS if kind != "profiles"]
+    installed = plugins.installed_points()
+    others = [point for group in groups for point in installed.select(group=group)]
 
     def forget() -> None:
         plugins.points.cache_clear()
@@ -73,11 +75,8 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
         ]
         for name, profile in profiles.items():
             monkeypatch.setattr(PLUGINS, name, profile, raising=False)
-        monkeypatch.setattr(
-            plugins,
-            "entry_points",
-            lambda group: EntryPoints(names) if group == "ptmtools.profiles" else real(group=group),
-        )
+        points = EntryPoints([*others, *names])
+        monkeypatch.setattr(plugins, "installed_points", lambda: points)
         forget()
 
     yield declare
@@ -164,13 +163,13 @@ def test_entry_points_are_read_when_needed(
 ) -> None:
     """Not to encode and decode with a profile of ptmtools, and not by an import."""
     install()
-    monkeypatch.setattr(plugins, "entry_points", None)
+    monkeypatch.setattr(plugins, "installed_points", None)
     np.testing.assert_array_equal(decode(encode(TEXELS, EncodeOptions("raw"))), TEXELS)
     with pytest.raises(TypeError):
         PROFILES["toy"]
     program = (
         "from ptmtools import plugins\n"
-        "plugins.entry_points = None\n"
+        "plugins.installed_points = None\n"
         "import ptmtools, ptmtools.texture\n"
         "assert ptmtools.texture.EncodeOptions().profile == 'fast'\n"
     )
