@@ -21,23 +21,23 @@ import numpy as np
 from scenes import TWO_ROOMS, model_file
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.rooms import grouped, leaf_of_cell
-from ptmtools.portal_flow.double_double import Searched
+from ptmtools.cells.rooms import group_cells, leaf_of_cell
+from ptmtools.portal_flow.double_double import SearchCost
 from ptmtools.scene import ingest
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 
 BUDGETS = (0, 2_000, 20_000, PvsOptions().budget, 1_000_000)
 
 
-def all_count_as(visible: bool) -> Callable[..., Searched]:
+def all_count_as(visible: bool) -> Callable[..., SearchCost]:
     """A search that takes every near tie for visible, or for hidden."""
 
-    def searched(g, s, test, known, source, budget, seen) -> Searched:  # type: ignore[no-untyped-def]
+    def searched(g, s, test, known, source, budget, seen) -> SearchCost:  # type: ignore[no-untyped-def]
         from ptmtools.portal_flow.flow_kernels import flow
 
         none = np.zeros(0, np.uint64)
         work, cut, ties, _ = flow(g, s, known, source, budget, none, visible, seen)
-        return Searched(cut, work, ties, 0, 0)
+        return SearchCost(cut, work, ties, 0, 0)
 
     return searched
 
@@ -79,13 +79,13 @@ def main(arguments: list[str] | None = None) -> int:
             shown.append(f" {pvs.average_share:.1%}, {seconds:.1f} s, {pvs.fallbacks:,} cut |")
         size = f"{cells.leaf_count:,} / {cells.portal_count:,}"
         print(f"| {model.stem} | {size} |{''.join(shown)}", flush=True)
-        rooms = grouped(cells, SubdivideOptions(wall_area=given.wall_area))
+        rooms = group_cells(cells, SubdivideOptions(wall_area=given.wall_area))
         room = rooms.leaf_cell[leaf_of_cell(cells)]
         pvs, seconds = timed(cells)
         row = [f"{int(n.sum()):,}" for n in (pvs.ties, pvs.decided, pvs.opened)]
         row.append(f"{pairs(pvs, room)}, {seconds:.1f} s")
         for visible in (True, False):
-            with patch("ptmtools.portal_flow.flow.searched", all_count_as(visible)):
+            with patch("ptmtools.portal_flow.flow.search", all_count_as(visible)):
                 pvs, seconds = timed(cells)
             row.append(f"{pairs(pvs, room)}, {seconds:.1f} s")
         ties.append(f"| {model.stem} | {' | '.join(row)} |")

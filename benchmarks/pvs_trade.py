@@ -148,14 +148,14 @@ def walk_of(folder: Path, model: Path) -> None:
 def cut(folder: Path, model: Path, area: float) -> dict[str, tuple[float, float]]:
     """Keeps the cells of both kinds; processor and wall seconds of each."""
     from ptmtools.cells import SubdivideOptions, subdivide
-    from ptmtools.cells.rooms import grouped
+    from ptmtools.cells.rooms import group_cells
     from ptmtools.scene import ingest
 
     subdivide(ingest(TWO_ROOMS))
     scene = ingest(model)
     options = SubdivideOptions(cells="leaf", wall_area=area)
     leaves, cpu, wall = timed(subdivide, scene, options)
-    rooms, more_cpu, more_wall = timed(grouped, leaves, SubdivideOptions(wall_area=area))
+    rooms, more_cpu, more_wall = timed(group_cells, leaves, SubdivideOptions(wall_area=area))
     stored(folder, "leaf", leaves)
     stored(folder, "room", rooms)
     return {"leaf": (cpu, wall), "room": (cpu + more_cpu, wall + more_wall)}

@@ -31,7 +31,7 @@ from scenes import MODELS, model_file
 from walk import at_hand, cell_texts, load, passed, standard_walk, texels_at_hand
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.rooms import grouped, leaf_of_cell
+from ptmtools.cells.rooms import group_cells, leaf_of_cell
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import ItemSurfaces
@@ -121,13 +121,13 @@ def main() -> None:
     for file in [m for m in given.models or MODELS.values() if m.is_file()]:
         scene = ingest(file)
         leaves = subdivide(scene, LEAF)
-        rooms = grouped(leaves, WHOLE)
+        rooms = group_cells(leaves, WHOLE)
         way = passed(leaves, standard_walk(rooms).corner)
         seen = views(scene, leaves, seed=1)
-        everywhere = grouped(subdivide(scene, ANYWHERE), SubdivideOptions())
+        everywhere = group_cells(subdivide(scene, ANYWHERE), SubdivideOptions())
         for name, options in kinds.items():
             start = time.process_time()
-            cells = everywhere if name == FLYING else grouped(leaves, options)
+            cells = everywhere if name == FLYING else group_cells(leaves, options)
             pvs = compute_pvs(cells)
             ach = compute_ach(scene, cells, pvs, AchOptions(backend="embree"))
             seconds = time.process_time() - start

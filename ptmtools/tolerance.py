@@ -66,6 +66,9 @@ DEPTH_SHARE = 2.0**-16
 #: A ray that goes on behind a surface begins this share of the size of the scene, 1 m at least,
 #: farther on: well above the rounding of float32 (6e-8).
 RAY_STEP_SHARE = 1e-6
+#: What is a radius away, but for this share of it, is not within the radius: polygons stand for
+#: circles, and GEOS rounds.
+TOUCH_SHARE = 1e-6
 #: Rays with a smaller cosine to the normal of a plane count as having this one.
 GRAZING_COSINE = 1e-9
 #: Points examined beside an edge of a face lie this share of the way towards its middle: 5 mm in a

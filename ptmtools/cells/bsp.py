@@ -28,8 +28,8 @@ from ptmtools.arrays import Bools, Floats, ranges
 from ptmtools.cells import split_planes as caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.planar import Geometry, buffer, difference, intersection, left_open
-from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
+from ptmtools.cells.planar import Geometry, buffer, difference, intersection, open_part
+from ptmtools.cells.planes import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.split_planes import DoorPlanes, Reveals
 from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.progress import Progress
@@ -233,10 +233,10 @@ class _Growth:
         """The fragments inside a body of the planes of a source other than walls."""
         planes, tolerance = self._planes, self._tolerance
         if source == _REVEALS:
-            return _sections(body, planes.reveals.within(body, self._walls), tolerance)
+            return _sections(body, planes.reveals.select(body, self._walls), tolerance)
         if source == _DOORS:
-            return _sections(body, planes.doors.within(body), tolerance)
-        return _sections(body, caps.closing(planes.structure, body), tolerance, whole=True)
+            return _sections(body, planes.doors.select(body), tolerance)
+        return _sections(body, caps.find_caps(planes.structure, body), tolerance, whole=True)
 
     def _finish(self, body: Polyhedron, parent: tuple[int, int]) -> None:
         self._place(parent, -2 - len(self.leaves))
@@ -408,7 +408,7 @@ def _seals(
         if len(strip) < 3 or abs(side.frame.plane[:3] @ inward[:3]) >= tolerance.cosine:
             continue
         strip = shapely.polygons(side.frame.to_plane(strip))
-        for part in shapely.get_parts(left_open(strip, side.blocking, tolerance)):
+        for part in shapely.get_parts(open_part(strip, side.blocking, tolerance)):
             rim = frame.to_plane(side.frame.to_space(shapely.get_coordinates(part)))
             edge = shapely.intersection(shapely.MultiPoint(rim).convex_hull, reach)
             if shapely.length(edge) > tolerance.hairline:

@@ -23,12 +23,11 @@ from ptmtools.cells.bsp import Tree
 from ptmtools.cells.doors import Doors
 from ptmtools.cells.floors import Floors, ceiling_height, detail_of
 from ptmtools.cells.model import descend
+from ptmtools.cells.named_rooms import Contact, Volumes, contacts
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.places import Places, find_places, spread
 from ptmtools.cells.planar import counting
 from ptmtools.cells.portals import find_portals
-from ptmtools.cells.room_planes import Contact, contacts
-from ptmtools.cells.room_volumes import Volumes
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.cells.split_planes import Reveals
 from ptmtools.cells.structure import (
@@ -59,7 +58,9 @@ class Viewing:
     tolerance: Tolerance
 
     @staticmethod
-    def of(places: Places, middle: float, structure: Floats, tolerance: Tolerance) -> Viewing:
+    def from_places(
+        places: Places, middle: float, structure: Floats, tolerance: Tolerance
+    ) -> Viewing:
         """``middle``: height of the middle of a body; ``structure``: (n, 3, 3) triangles."""
         points, area = _thin(*spread(places.triangles(tolerance)))
         beside = _points_beside(structure, 2 * tolerance.plane)
@@ -138,23 +139,25 @@ class Building:
     facets: int = 0  # planes of a scanned surface, which do not split
 
     @staticmethod
-    def of(scene: Scene, options: SubdivideOptions, executor: Executor | None = None) -> Building:
+    def from_scene(
+        scene: Scene, options: SubdivideOptions, executor: Executor | None = None
+    ) -> Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
-        opaque = Opaque.of(scene, options)
-        structure = Structure.of(opaque, tolerance)
+        opaque = Opaque.from_scene(scene, options)
+        structure = Structure.from_opaque(opaque, tolerance)
         doors, structure = Doors.recognise(scene, opaque, structure, options)
         every = find_walls(structure, options.wall_area)
         walls = every if options.structural else without_facets(every)
         reveals = Reveals(structure, options.wall_thickness)
         walker = Walker(*options.walker)
         detail = detail_of(scene, structure, options)
-        floors = Floors.of(scene, detail, GRAIN * walker.radius)
+        floors = Floors.from_scene(scene, detail, GRAIN * walker.radius)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
         places = find_places(floors, solid, walker, tolerance, executor)
         ceiling = None
         if options.ceiling == "auto":
             ceiling = ceiling_height(structure, walls, walker, options.wall_area)
-        volumes = Volumes.of(scene, options)
+        volumes = Volumes.from_scene(scene, options)
         touching = contacts(volumes.rooms, options, tolerance)
         return Building(
             structure=structure,
@@ -183,7 +186,9 @@ class Building:
         fixed = options.cells == "leaf" or options.standing == "anywhere" or self.doors.leaves
         if fixed or not 0 < options.gain < 1 or not len(places.plan) or self._has_rooms():
             return None
-        return Viewing.of(places, self.walker.middle, structure.corners, structure.tolerance)
+        return Viewing.from_places(
+            places, self.walker.middle, structure.corners, structure.tolerance
+        )
 
     def _has_rooms(self) -> bool:
         """Whether some of the places are inside a building that is not solid."""
@@ -191,7 +196,7 @@ class Building:
         points, size = spread(self.places.triangles(structure.tolerance))
         points = spread_over(points, _SAMPLES) + [0.0, self.walker.middle, 0.0]
         around = Surroundings(structure.corners, structure.tolerance)
-        inside = around.inside(points)
+        inside = around.enclose(points)
         some = spread_over(points[inside], LOOKS)
         hollow = np.mean([not around.solid(point[None]) for point in some]) if len(some) else 0.0
         return bool(inside.mean() * hollow * size.sum() >= _ROOM)

@@ -33,7 +33,7 @@ from ptmtools.cells.planar import Geometry
 from ptmtools.cells.planes import bounds
 from ptmtools.cells.portals import Portal, find_portals, flood
 from ptmtools.cells.roles import Designated, connected_pieces, is_door_name, triangles_named
-from ptmtools.cells.search import Nearby, connected, distinct
+from ptmtools.cells.search import Nearby, connect, distinct
 from ptmtools.cells.split_planes import DoorPlanes
 from ptmtools.cells.structure import Opaque, Structure, Surroundings, spread_over
 from ptmtools.scene.model import Scene
@@ -81,7 +81,7 @@ def find_doors(
     scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
 ) -> list[DoorLeaf]:
     """The door leaves of a scene, in the order of their first triangles in the file."""
-    roles = Designated.of(scene, options)
+    roles = Designated.from_options(scene, options)
     is_door = roles.door
     free = is_door | ~(roles.structural | roles.detail)
     named = triangles_named(scene, is_door_name) & free
@@ -89,13 +89,13 @@ def find_doors(
     designated = _pieces(scene, np.flatnonzero(is_door))
     by_name = _named_slabs(scene, np.flatnonzero(named), slack)
     leaf = _leaf_of_slab(by_name, slack)
-    by_name = by_name.only(free_on_both_sides(by_name.merged(leaf), structure)[leaf])
+    by_name = by_name.only(free_on_both_sides(by_name.merge(leaf), structure)[leaf])
     flat = _flat(scene, structure, np.flatnonzero((free & ~is_door)[structure.source]))
     by_shape = _closing(flat, structure, options)
-    slabs = designated.joined(by_name).joined(by_shape)
+    slabs = designated.append(by_name).append(by_shape)
     leaf = _leaf_of_slab(slabs, slack)
     slab_named = np.bincount(leaf, np.arange(len(slabs)) < len(designated) + len(by_name)) > 0
-    leaves = _leaves(scene, slabs.merged(leaf), slab_named, free, is_door | named, opaque, slack)
+    leaves = _leaves(scene, slabs.merge(leaf), slab_named, free, is_door | named, opaque, slack)
     return sorted(leaves, key=lambda leaf: int(leaf.triangles[0]))
 
 
@@ -115,32 +115,37 @@ def _door_sized(slabs: Slabs, slack: float) -> Bools:
 
 def _pieces(scene: Scene, triangles: Ints) -> Slabs:
     """The connected pieces of objects, of these triangles."""
-    mesh = Welded.of(scene.points, scene.triangles[triangles])
+    mesh = Welded.from_triangles(scene.points, scene.triangles[triangles])
     source = triangles[mesh.source]
-    return Slabs.of(mesh.corners, _cross(connected_pieces(mesh), scene.triangle_object[source]))
+    return Slabs.from_triangles(
+        mesh.corners, _cross(connected_pieces(mesh), scene.triangle_object[source])
+    )
 
 
 def _named_slabs(scene: Scene, triangles: Ints, slack: float) -> Slabs:
     """The pieces and the rectangles of these triangles that have the size of a door. A piece with
     several rectangles of that size is no leaf, unless they are the two faces of one slab."""
-    mesh = Welded.of(scene.points, scene.triangles[triangles])
+    mesh = Welded.from_triangles(scene.points, scene.triangles[triangles])
     owner = scene.triangle_object[triangles[mesh.source]]
     piece = _cross(connected_pieces(mesh), owner)
-    region = _cross(Facets.of(mesh, scene.tolerance).region, owner)
-    pieces, flat = Slabs.of(mesh.corners, piece), Slabs.of(mesh.corners, region)
+    region = _cross(Facets.from_mesh(mesh, scene.tolerance).region, owner)
+    pieces, flat = (
+        Slabs.from_triangles(mesh.corners, piece),
+        Slabs.from_triangles(mesh.corners, region),
+    )
     whole = np.zeros(len(flat), dtype=np.int64)
     whole[region] = piece
     fits = _door_sized(flat, slack)
     flat, whole = flat.only(fits), whole[fits]
     grid = scene.tolerance.grid
-    filled = flat.filled(grid) >= FILLED
+    filled = flat.filled_share(grid) >= FILLED
     flat, whole = flat.only(filled), whole[filled]
     leaf = _leaf_of_slab(flat, slack)
     faces = np.bincount(leaf)[leaf]
     alone = np.bincount(whole)[whole] == 1 if len(whole) else np.zeros(0, dtype=bool)
     pieces = pieces.only(_door_sized(pieces, slack))
-    pieces = pieces.only(pieces.filled(grid) >= FILLED)
-    return pieces.joined(flat.only((faces > 1) | alone))
+    pieces = pieces.only(pieces.filled_share(grid) >= FILLED)
+    return pieces.append(flat.only((faces > 1) | alone))
 
 
 def _flat(scene: Scene, structure: Structure, which: Ints) -> Slabs:
@@ -149,7 +154,7 @@ def _flat(scene: Scene, structure: Structure, which: Ints) -> Slabs:
     group = _cross(
         structure.region[which], scene.triangle_object[source], scene.triangle_material[source]
     )
-    slabs = Slabs.of(structure.corners[which], group)
+    slabs = Slabs.from_triangles(structure.corners[which], group)
     return slabs.only(_door_sized(slabs, structure.tolerance.plane))
 
 
@@ -167,29 +172,29 @@ def _closing(slabs: Slabs, structure: Structure, options: SubdivideOptions) -> S
     if not len(slabs):
         return slabs
     leaf = _leaf_of_slab(slabs, structure.tolerance.plane)
-    leaves = slabs.merged(leaf)
+    leaves = slabs.merge(leaf)
     fits = _door_sized(leaves, structure.tolerance.plane)
-    pair = leaves.near(PAIR)
-    one, other = pair.T
-    thick, wide, high = np.moveaxis(leaves.overlaps(one, other), -1, 0)
-    paired = fits[one] & fits[other] & (np.abs(wide) <= PAIR)
-    paired &= (thick >= -structure.tolerance.plane) & (high >= 0.9 * leaves.size[one, 2])
-    one, other = one[paired], other[paired]
-    door = connected(len(leaves), np.stack([one, other], axis=1))
+    pair = leaves.find_near_pairs(PAIR)
+    first, second = pair.T
+    thick, wide, high = np.moveaxis(leaves.overlaps(first, second), -1, 0)
+    paired = fits[first] & fits[second] & (np.abs(wide) <= PAIR)
+    paired &= (thick >= -structure.tolerance.plane) & (high >= 0.9 * leaves.size[first, 2])
+    first, second = first[paired], second[paired]
+    door = connect(len(leaves), np.stack([first, second], axis=1))
     door = np.unique(door, return_inverse=True)[1].reshape(-1)
-    closes = close_openings(leaves.merged(door), structure, options.wall_thickness)
+    closes = close_openings(leaves.merge(door), structure, options.wall_thickness)
     return slabs.only((closes[door] & fits)[leaf])
 
 
 def _leaf_of_slab(slabs: Slabs, slack: float) -> Ints:
     """(k,) leaves from 0: parallel slabs behind one another are one leaf."""
-    pair = slabs.near(THICK)
-    one, other = pair.T
-    overlap = slabs.overlaps(one, other)
-    least = np.minimum(slabs.size[one], slabs.size[other])
-    together = slabs.size[one, 0] + slabs.size[other, 0] - overlap[:, 0]
+    pair = slabs.find_near_pairs(THICK)
+    first, second = pair.T
+    overlap = slabs.overlaps(first, second)
+    least = np.minimum(slabs.size[first], slabs.size[second])
+    together = slabs.size[first, 0] + slabs.size[second, 0] - overlap[:, 0]
     alike = (together <= THICK + slack) & (overlap[:, 1:] > least[:, 1:] / 2).all(axis=1)
-    group = connected(len(slabs), pair[alike])
+    group = connect(len(slabs), pair[alike])
     return np.unique(group, return_inverse=True)[1].reshape(-1)
 
 
@@ -210,10 +215,10 @@ def _leaves(
     """
     if not len(slabs):
         return
-    corners, of = scene.corners, opaque.source
+    corners, source = scene.corners, opaque.source
     region = np.zeros(len(corners), dtype=np.int64)
-    owner = scene.triangle_object[of], scene.triangle_material[of]
-    region[of] = 1 + _cross(opaque.facets.region, *owner)
+    owner = scene.triangle_object[source], scene.triangle_material[source]
+    region[source] = 1 + _cross(opaque.facets.region, *owner)
     size = np.bincount(region)
     nearby = Nearby(corners, slack)
     reach = np.array([RELIEF, slack, slack])
@@ -227,13 +232,13 @@ def _leaves(
         inside = (off <= reach).all(axis=1) & free[about]
         about, local, off = about[inside], local[inside], off[inside]
         sides = [np.abs(local - side).max(axis=1)[:, 1:] <= slack for side in (low, high)]
-        own = (off[:, 0] <= slack) & ~(is_named & np.any(sides, axis=(0, 2)))
-        own |= named[about]
-        names, count = np.unique(region[about[own]], return_counts=True)
+        belongs = (off[:, 0] <= slack) & ~(is_named & np.any(sides, axis=(0, 2)))
+        belongs |= named[about]
+        names, count = np.unique(region[about[belongs]], return_counts=True)
         whole = names[(count == size[names]) | (names == 0)]  # 0: outside all regions
-        own &= np.isin(region[about], whole)
-        own[own] = ~_find_repeats(corners[about], own)
-        triangles = about[own]
+        belongs &= np.isin(region[about], whole)
+        belongs[belongs] = ~_find_repeats(corners[about], belongs)
+        triangles = about[belongs]
         if len(triangles):
             largest = triangles[np.argmax(areas(corners[triangles]))]
             name = scene.objects[scene.triangle_object[largest]]
@@ -261,7 +266,7 @@ class Doors:
     """The door leaves of a building, with the glass and roofs that separate inside and outside."""
 
     leaves: list[DoorLeaf]
-    of: Ints  # (T,) the leaf to which each triangle of the structure belongs, or -1
+    leaf_of_triangle: Ints  # (T,) the leaf to which each triangle of the structure belongs, or -1
     glass: Floats  # (n, 3, 3) transparent triangles, metres
     roofed: bool  # whether the building has roofs or ceilings
     planes: DoorPlanes
@@ -277,16 +282,17 @@ class Doors:
             leaf[door.triangles] = i
         glass, roofed = scene.corners[~scene.opaque], True
         if leaves:
-            structure = Structure.of(opaque, structure.tolerance, leaf >= 0)
+            structure = Structure.from_opaque(opaque, structure.tolerance, leaf >= 0)
             roofed = roofed_share(structure.corners, options.wall_area) >= ROOFED
-        of = leaf[structure.source]
+        leaf_of_triangle = leaf[structure.source]
         across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
-        return Doors(leaves, of, glass, roofed, DoorPlanes.of(structure, of, across)), structure
+        planes = DoorPlanes.from_structure(structure, leaf_of_triangle, across)
+        return Doors(leaves, leaf_of_triangle, glass, roofed, planes), structure
 
     def triangles(self, which: Bools) -> NDArray[np.int32]:
         """The triangles of the scene, ascending, of the leaves ``which``, (d,)."""
-        each = [self.leaves[i].triangles for i in np.flatnonzero(which)]
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *each])).astype(np.int32)
+        chosen = [self.leaves[i].triangles for i in np.flatnonzero(which)]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *chosen])).astype(np.int32)
 
     def sides(self, tree: Tree, within: Bools) -> Bools:
         """(d, 2) which sides of door leaves are in the (L,) tree leaves ``within``."""
@@ -303,14 +309,16 @@ class Doors:
         """Whether a door leads from ``inside``, (L,) tree leaves, into a room that the ``outside``,
         (L,), reaches too, such as through a window."""
         which = self.sides(tree, inside).any(axis=1) & self.sides(tree, outside).any(axis=1)
-        return bool(which.any()) and bool((which & self.sheltered(structure)).any())
+        return bool(which.any()) and bool((which & self.find_sheltered(structure)).any())
 
-    def sheltered(self, structure: Structure) -> Bools:
+    def find_sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have walls around and a roof above the ways on both sides."""
         around = Surroundings(np.concatenate([structure.corners, self.glass]), structure.tolerance)
         ways = (_ways(door, around) for door in self.leaves)
-        each = [all(around.inside(points, self.roofed).all() for points in way) for way in ways]
-        return np.array(each, dtype=bool)
+        enclosed = [
+            all(around.enclose(points, self.roofed).all() for points in way) for way in ways
+        ]
+        return np.array(enclosed, dtype=bool)
 
     def lead_out(self, portals: list[Portal], outside: Bools) -> Bools:
         """(d,) which leaves have portals around them that lead ``outside``, (L,): some frames leave
@@ -336,8 +344,8 @@ def _ways(door: DoorLeaf, around: Surroundings) -> Iterator[Floats]:
     for side, turn in zip(door.grid(RELIEF), (1.0, -1.0), strict=True):
         start, to = side.mean(axis=0), turn * door.axes[0]
         free = around.first(start[None], to[None])[0][0]
-        far = [d for d in _WAY if d < free] or [free / 2]
-        yield start + np.array(far)[:, None] * to
+        distances = [d for d in _WAY if d < free] or [free / 2]
+        yield start + np.array(distances)[:, None] * to
 
 
 def open_doors(
@@ -357,7 +365,7 @@ def open_doors(
     """
     which = np.asarray(doors.sides(tree, within).all(axis=1))
     if which.any() and not outer.any():
-        which &= doors.sheltered(structure)
+        which &= doors.find_sheltered(structure)
     rooms = tuple(np.flatnonzero(within).tolist())
     outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
     while which.any():
@@ -378,14 +386,14 @@ def _open(
     hiding: bool,
 ) -> tuple[Tree, list[Portal]]:
     """The tree and its portals with the doors ``which``, (d,), open."""
-    free = np.append(which, False)[doors.of]
+    free = np.append(which, False)[doors.leaf_of_triangle]
     near = structure.tolerance.plane
     walls, fresh = list(tree.walls), []
     united: dict[bytes, Geometry] = {}  # of planes with several nodes
     for node, wall in enumerate(tree.walls):
         plane, body = wall.frame.plane, tree.capped.get(node)
         if body is None:
-            flat = structure.nearby.between(plane, -near, near)
+            flat = structure.nearby.find_between(plane, -near, near)
         else:
             flat = structure.nearby.meeting(*bounds(body.points))
         if free[flat].any():
@@ -394,7 +402,7 @@ def _open(
             rest = flat[~free[flat]]
             key = plane.tobytes() + rest.tobytes()
             if key not in united:
-                united[key] = structure.united(wall.frame, rest)
+                united[key] = structure.unite(wall.frame, rest)
             barring = united[key]
             walls[node] = (
                 replace(wall, barring=barring) if hiding else replace(wall, blocking=barring)
@@ -430,7 +438,7 @@ class Enclosure:
     leaving: float
 
     @property
-    def closed(self) -> bool:
+    def looks_closed(self) -> bool:
         """Whether it looks closed."""
         return self.rooms > 0 and self.leaving <= CLOSED
 
@@ -439,21 +447,23 @@ def enclosure(scene: Scene, options: SubdivideOptions | None = None) -> Enclosur
     """How enclosed a scene is, its door leaves shut."""
     options = options or SubdivideOptions()
     tolerance = scene.tolerance.for_walls(options.wall_thickness)
-    opaque = Opaque.of(scene, options)
-    doors, structure = Doors.recognise(scene, opaque, Structure.of(opaque, tolerance), options)
+    opaque = Opaque.from_scene(scene, options)
+    doors, structure = Doors.recognise(
+        scene, opaque, Structure.from_opaque(opaque, tolerance), options
+    )
     corners, names = structure.corners, tuple(leaf.name for leaf in doors.leaves)
     if not len(corners):
         return Enclosure(names, 0.0, 0, 0.0)
-    floors = Floors.of(scene, detail_of(scene, structure, options))
+    floors = Floors.from_scene(scene, detail_of(scene, structure, options))
     around = Surroundings(corners, tolerance)
     points, _ = spread(floors.corners)
     points = spread_over(points, 4 * _POINTS) + [0.0, _EYE, 0.0]
-    points = spread_over(points[around.inside(points)], _POINTS)
+    points = spread_over(points[around.enclose(points)], _POINTS)
     leaving = 0.0
     if len(points):
         along = np.tile(_sphere(_LINES), (len(points), 1))
-        far, _ = around.first(np.repeat(points, _LINES, axis=0), along)
-        leaving = float(np.isinf(far).mean())
+        distance, _ = around.first(np.repeat(points, _LINES, axis=0), along)
+        leaving = float(np.isinf(distance).mean())
     return Enclosure(names, roofed_share(corners, options.wall_area), len(points), leaving)
 
 

@@ -58,7 +58,7 @@ class Slabs:
     group: Ints  # (n,) the group of each, ascending from 0
 
     @staticmethod
-    def of(corners: Floats, group: Ints) -> Slabs:
+    def from_triangles(corners: Floats, group: Ints) -> Slabs:
         """Of (n, 3, 3) triangles in (n,) groups from 0, none empty."""
         order = np.argsort(group, kind="stable")
         corners, group = corners[order], group[order]
@@ -76,10 +76,12 @@ class Slabs:
         lies = np.abs(across[:, 1]) > 1 - _LEANS
         along = cross(np.where(lies[:, None], _ASIDE, _UP), across)
         along /= np.linalg.norm(along, axis=1, keepdims=True)
-        return Slabs._along(np.stack([across, along, cross(across, along)], axis=1), corners, group)
+        return Slabs._from_axes(
+            np.stack([across, along, cross(across, along)], axis=1), corners, group
+        )
 
     @staticmethod
-    def _along(axes: Floats, corners: Floats, group: Ints) -> Slabs:
+    def _from_axes(axes: Floats, corners: Floats, group: Ints) -> Slabs:
         local = np.einsum("nck,nak->nca", corners, axes[group])
         begin = np.searchsorted(group, np.arange(len(axes)))
         if not len(begin):
@@ -109,26 +111,26 @@ class Slabs:
         group = place[self.group[kept]]
         return Slabs(self.axes[row], self.low[row], self.high[row], self.corners[kept], group)
 
-    def joined(self, other: Slabs) -> Slabs:
+    def append(self, slabs: Slabs) -> Slabs:
         """These slabs, then the others."""
         return Slabs(
-            np.concatenate([self.axes, other.axes]),
-            np.concatenate([self.low, other.low]),
-            np.concatenate([self.high, other.high]),
-            np.concatenate([self.corners, other.corners]),
-            np.concatenate([self.group, other.group + len(self)]),
+            np.concatenate([self.axes, slabs.axes]),
+            np.concatenate([self.low, slabs.low]),
+            np.concatenate([self.high, slabs.high]),
+            np.concatenate([self.corners, slabs.corners]),
+            np.concatenate([self.group, slabs.group + len(self)]),
         )
 
-    def merged(self, whole: Ints) -> Slabs:
+    def merge(self, whole: Ints) -> Slabs:
         """One for each of (k,) names, from 0, along the axes of the largest of its slabs."""
         size = self.size
         order = np.lexsort((np.arange(len(self)), -size[:, 1] * size[:, 2], whole))
         first = order[np.unique(whole[order], return_index=True)[1]]
         group = whole[self.group]
         row = np.argsort(group, kind="stable")
-        return Slabs._along(self.axes[first], self.corners[row], group[row])
+        return Slabs._from_axes(self.axes[first], self.corners[row], group[row])
 
-    def near(self, gap: float) -> Ints:
+    def find_near_pairs(self, gap: float) -> Ints:
         """(p, 2) pairs, each once, of parallel slabs whose world-aligned boxes in plan, and whose
         heights, are less than a gap apart."""
         if not len(self):
@@ -140,10 +142,13 @@ class Slabs:
         by_height, storey = ByHeight(low[:, 1], high[:, 1]), np.floor(low[:, 1] / _STOREY)
         pairs = []
         for name in np.unique(storey):
-            here = np.flatnonzero(storey == name)
-            about = by_height.between(low[here, 1].min() - gap, high[here, 1].max() + gap)
-            one, other = shapely.STRtree(plan[about]).query(plan[here], "dwithin", distance=gap)
-            pairs.append(np.stack([here[one], about[other]], axis=1))
+            on_storey = np.flatnonzero(storey == name)
+            about = by_height.find_between(
+                low[on_storey, 1].min() - gap, high[on_storey, 1].max() + gap
+            )
+            nearby = shapely.STRtree(plan[about])
+            first, second = nearby.query(plan[on_storey], "dwithin", distance=gap)
+            pairs.append(np.stack([on_storey[first], about[second]], axis=1))
         pair = np.concatenate(pairs)
         pair = np.unique(np.sort(pair[pair[:, 0] != pair[:, 1]], axis=1), axis=0)
         apart = np.maximum(low[pair[:, 0], 1], low[pair[:, 1], 1]) - np.minimum(
@@ -154,18 +159,18 @@ class Slabs:
         turn = np.abs(np.einsum("pk,pk->p", across[:, 0], across[:, 1]))
         return np.asarray(pair[turn >= _PARALLEL])
 
-    def overlaps(self, one: Ints, other: Ints) -> Floats:
+    def overlaps(self, first: Ints, second: Ints) -> Floats:
         """(p, 3) how far the boxes of parallel slabs overlap across, along and up, metres, both in
         the axes of the first; negative where they are apart."""
         bits = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
-        ends = np.where(bits[None] == 1, self.high[other, None], self.low[other, None])
-        world = np.einsum("pca,pak->pck", ends, self.axes[other])
-        local = np.einsum("pck,pak->pca", world, self.axes[one])
-        low = np.maximum(local.min(axis=1), self.low[one])
-        result: Floats = np.minimum(local.max(axis=1), self.high[one]) - low
+        ends = np.where(bits[None] == 1, self.high[second, None], self.low[second, None])
+        world = np.einsum("pca,pak->pck", ends, self.axes[second])
+        local = np.einsum("pck,pak->pca", world, self.axes[first])
+        low = np.maximum(local.min(axis=1), self.low[first])
+        result: Floats = np.minimum(local.max(axis=1), self.high[first]) - low
         return result
 
-    def filled(self, grid: float) -> Floats:
+    def filled_share(self, grid: float) -> Floats:
         """(k,) the share of its rectangle, along and up, that each fills, united on a ``grid``."""
         flat = np.einsum("nck,nak->nca", self.corners, self.axes[self.group][:, 1:])
         begin = np.searchsorted(self.group, np.arange(len(self) + 1))
@@ -208,11 +213,11 @@ def _closes_by_rays(rays: _Rays, wall_thickness: float) -> Bools:
         # The reveals are looked for half way between the slab and the nearer face of the wall.
         depth = np.minimum(walls[0][k], walls[1][k]) - half
         depth = np.where(np.isfinite(depth), depth, 0.0)
-        revealed |= (depth >= _REVEAL) & _revealed(rays, turn * (half + depth / 2))
+        revealed |= (depth >= _REVEAL) & _has_reveals(rays, turn * (half + depth / 2))
         # The floor is measured just outside the wall, from a little above the foot of the slab.
         room = np.maximum(walls[0][k], walls[1][k])
         room = np.where(np.isfinite(room), room, 0.0) + 2 * _GAP
-        below = rays.at(turn * room, _SHARES, np.zeros(3), above=2 * _GAP)
+        below = rays.points_at(turn * room, _SHARES, np.zeros(3), above=2 * _GAP)
         floors.append(np.median(rays.meet(below, (0, 0, -1))[0], axis=1) - 2 * _GAP)
     result &= revealed & (np.minimum(*floors) <= _GAP) & rays.free()
     return result
@@ -223,27 +228,27 @@ def _wall(
 ) -> tuple[Floats, Floats]:
     """(k,) and (k,): metres from the middle of the leaf ahead and back to the faces of the wall at
     one of its sides; infinite where there is no wall."""
-    start = rays.at(np.zeros(len(half)), along, up, aside, above)
+    start = rays.points_at(np.zeros(len(half)), along, up, aside, above)
     (ahead, square), (behind, squared) = (rays.meet(start, (turn, 0, 0)) for turn in (1, -1))
     within = np.minimum(ahead, behind) >= half[:, None] - _PROUD
     wall = within & square & squared & (ahead + behind <= limit)
     stands = wall.mean(axis=1) >= _AGREEING
-    first, second = (np.where(wall, far, 0.0).max(axis=1) for far in (ahead, behind))
+    first, second = (np.where(wall, distance, 0.0).max(axis=1) for distance in (ahead, behind))
     return np.where(stands, first, np.inf), np.where(stands, second, np.inf)
 
 
-def _revealed(rays: _Rays, depth: Floats) -> Bools:
+def _has_reveals(rays: _Rays, depth: Floats) -> Bools:
     """(k,) which leaves have the sides and the top of an opening in front of them, (k,) metres
     from the middle of each."""
     result = np.ones(len(depth), dtype=bool)
-    middle = rays.at(depth, np.full(3, 0.5), _SHARES)
+    middle = rays.points_at(depth, np.full(3, 0.5), _SHARES)
     for turn in (1, -1):
-        far, square = rays.meet(middle, (0, turn, 0))
-        jamb = square & (np.abs(far - rays.size[:, 1, None] / 2) <= _GAP)
+        distance, square = rays.meet(middle, (0, turn, 0))
+        jamb = square & (np.abs(distance - rays.size[:, 1, None] / 2) <= _GAP)
         result &= jamb.mean(axis=1) >= _AGREEING
-    top = rays.at(depth, _SHARES, np.ones(3), above=-2 * _GAP)
-    far, square = rays.meet(top, (0, 0, 1))
-    result &= (square & (far <= 3 * _GAP)).mean(axis=1) >= _AGREEING
+    top = rays.points_at(depth, _SHARES, np.ones(3), above=-2 * _GAP)
+    distance, square = rays.meet(top, (0, 0, 1))
+    result &= (square & (distance <= 3 * _GAP)).mean(axis=1) >= _AGREEING
     return result
 
 
@@ -266,7 +271,7 @@ class _Rays:
         self._slabs, self._around = slabs, around
         self.size = slabs.size
 
-    def at(
+    def points_at(
         self, depth: Floats, along: Floats, up: Floats, aside: float = 0.0, above: float = 0.0
     ) -> Floats:
         """(k, p, 3) points (k,) metres across from the middle of each slab, at (p,) shares of its
@@ -280,7 +285,7 @@ class _Rays:
         """(k,) which slabs have room in front of them and behind."""
         result = np.ones(len(self.size), dtype=bool)
         for turn in (1, -1):
-            ahead = self.at(turn * (self.size[:, 0] / 2 + RELIEF), *_SHARES_ALL_OVER)
+            ahead = self.points_at(turn * (self.size[:, 0] / 2 + RELIEF), *_SHARES_ALL_OVER)
             result &= (self.meet(ahead, (turn, 0, 0))[0] >= _FREE).mean(axis=1) >= _AGREEING
         return result
 
@@ -290,6 +295,6 @@ class _Rays:
         axes = self._slabs.axes
         points = np.einsum("kpa,kac->kpc", start, axes)
         along = np.broadcast_to((np.array(to) @ axes)[:, None], points.shape)
-        far, facing = self._around.first(points.reshape(-1, 3), along.reshape(-1, 3))
+        distance, facing = self._around.first(points.reshape(-1, 3), along.reshape(-1, 3))
         square = np.abs(np.einsum("pc,pc->p", facing, along.reshape(-1, 3))) >= _SQUARE
-        return far.reshape(start.shape[:2]), square.reshape(start.shape[:2])
+        return distance.reshape(start.shape[:2]), square.reshape(start.shape[:2])

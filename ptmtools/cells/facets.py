@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
-from ptmtools.cells.planar import bounded, count, divided, simplified
+from ptmtools.cells.planar import build_areas, count, simplify, triangulate_polygons
 from ptmtools.cells.planes import UPWARD, plane_axes
 from ptmtools.cells.search import distinct
 from ptmtools.tolerance import Tolerance, rank
@@ -29,7 +29,7 @@ class Welded:
     source: Ints  # (n,) the first of the original triangles equal to each, ascending
 
     @staticmethod
-    def of(points: Floats, triangles: NDArray[np.integer]) -> Welded:
+    def from_triangles(points: Floats, triangles: NDArray[np.integer]) -> Welded:
         """The mesh of (T, 3) triangles over (V, 3) points."""
         first, row = distinct(points)
         renamed = row[triangles]
@@ -50,9 +50,9 @@ def across_edges(triangle: NDArray[np.integer], turned: Bools) -> NDArray[np.int
     where there is none or several, or it has the edge in the same direction. Triangles ``turned``
     count as wound the other way."""
     count = len(triangle)
-    one, other = triangle.astype(np.int64), np.roll(triangle, -1, axis=1).astype(np.int64)
-    low, high = np.minimum(one, other).ravel(), np.maximum(one, other).ravel()
-    upward = ((one < other) ^ turned[:, None]).ravel()
+    start, end = triangle.astype(np.int64), np.roll(triangle, -1, axis=1).astype(np.int64)
+    low, high = np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
+    upward = ((start < end) ^ turned[:, None]).ravel()
     key = low * (int(high.max(initial=0)) + 1) + high
     order = np.argsort(key, kind="stable")
     begin = np.flatnonzero(np.append(True, key[order[1:]] != key[order[:-1]])[: len(order)])
@@ -89,7 +89,7 @@ class Facets:
     whole: Bools  # (r,) whether all of it lies in one plane
 
     @staticmethod
-    def of(mesh: Welded, tolerance: Tolerance) -> Facets:
+    def from_mesh(mesh: Welded, tolerance: Tolerance) -> Facets:
         """The regions of a mesh, the largest triangles first."""
         from ptmtools.cells.kernels import grow_regions
 
@@ -113,27 +113,28 @@ class Facets:
         whole = np.bincount(region, away, count) == 0
         return Facets(mesh, beyond, turned, region, double / 2, weight / 2, mean, whole)
 
-    def fewer(self, which: Bools, tolerance: Tolerance) -> tuple[Floats, Ints]:
+    def reduce(self, which: Bools, tolerance: Tolerance) -> tuple[Floats, Ints]:
         """The surface of the triangles ``which``, (n,), in fewer triangles, (m, 3, 3), and (m,) the
         triangle of the mesh that each is, or the first of its region, ascending."""
         size = np.bincount(self.region, which, len(self.area))
         rim = which[:, None] & (self.beyond < 0)
         inner = ~rim & which[:, None]
-        other = np.where(inner, self.beyond, 0)
-        rim |= inner & ((self.region[other] != self.region[:, None]) | ~which[other])
+        neighbour = np.where(inner, self.beyond, 0)
+        rim |= inner & ((self.region[neighbour] != self.region[:, None]) | ~which[neighbour])
         edges = np.bincount(self.region, rim.sum(axis=1), len(self.area))
         # An outline of e edges takes e - 2 triangles or more; most of its corners are on straights.
         many = self.whole & (size >= _MANY) & (edges <= size / 2)
         chosen = np.flatnonzero(many)
         outline = rim & many[self.region][:, None]
         area = sum_by_group(self.region, self.areas * which, len(self.area))[chosen]
-        corners, of = self._retriangulate(chosen, area, outline, tolerance)
+        corners, owner = self._retriangulate(chosen, area, outline, tolerance)
         # Wound as most of the region is.
         facing = self.areas * which * np.where(self.turned, -1.0, 1.0)
         facing = sum_by_group(self.region, facing, len(self.area))[chosen]
-        back = np.einsum("ij,ij->i", normals(corners), self.normal[chosen[of]]) * facing[of] < 0
+        turn = np.einsum("ij,ij->i", normals(corners), self.normal[chosen[owner]])
+        back = turn * facing[owner] < 0
         corners[back] = corners[back][:, ::-1]
-        count = np.bincount(of, minlength=len(chosen))
+        count = np.bincount(owner, minlength=len(chosen))
         saved = (count > 0) & (count <= (1 - _SAVED) * size[chosen])
         kept = which.copy()
         replaced = np.zeros(len(self.area), dtype=bool)
@@ -141,8 +142,8 @@ class Facets:
         kept &= ~replaced[self.region]
         first = np.full(len(self.area), len(which))
         np.minimum.at(first, self.region, np.where(which, np.arange(len(which)), len(which)))
-        fresh = saved[of]
-        source = np.concatenate([np.flatnonzero(kept), first[chosen[of[fresh]]]])
+        fresh = saved[owner]
+        source = np.concatenate([np.flatnonzero(kept), first[chosen[owner[fresh]]]])
         every = np.concatenate([self.mesh.corners[kept], corners[fresh]])
         order = np.argsort(source, kind="stable")
         return every[order], source[order]
@@ -158,31 +159,32 @@ class Facets:
         at, k = np.nonzero(outline)
         place = np.full(len(self.area), -1)
         place[chosen] = np.arange(len(chosen))
-        of = place[self.region[at]]
-        order = np.argsort(of, kind="stable")
-        at, k, of = at[order], k[order], of[order]
+        owner = place[self.region[at]]
+        order = np.argsort(owner, kind="stable")
+        at, k, owner = at[order], k[order], owner[order]
         ends = np.stack([self.mesh.triangle[at, k], self.mesh.triangle[at, (k + 1) % 3]], axis=1)
         u, v = plane_axes(self.normal[chosen])
         space = self.mesh.point[ends]
         flat = np.stack(
-            [np.einsum("eki,ei->ek", space, u[of]), np.einsum("eki,ei->ek", space, v[of])], axis=2
+            [np.einsum("eki,ei->ek", space, u[owner]), np.einsum("eki,ei->ek", space, v[owner])],
+            axis=2,
         )
-        areas = bounded(flat, of)
+        areas = build_areas(flat, owner)
         straight = _STRAIGHT_SHARE * tolerance.plane
-        areas = simplified(areas, straight)
+        areas = simplify(areas, straight)
         allowed = straight * shapely.length(areas) + tolerance.rounding * tolerance.extent
         sound = shapely.is_valid(areas) & (np.abs(shapely.area(areas) - area) <= allowed)
         sound_rows = np.flatnonzero(sound)
-        rings, which = divided(areas[sound_rows])
-        return self._lift(rings, sound_rows[which], flat, of, space)
+        rings, which = triangulate_polygons(areas[sound_rows])
+        return self._lift(rings, sound_rows[which], flat, owner, space)
 
     def _lift(
-        self, rings: Floats, which: Ints, flat: Floats, of: Ints, space: Floats
+        self, rings: Floats, which: Ints, flat: Floats, owner: Ints, space: Floats
     ) -> tuple[Floats, Ints]:
         """(m, 3, 3) positions of (k, 3, 2) triangles of regions ``which``, those of the ends of
-        edges, ``flat`` and in ``space``, (e, 2, …), of the regions ``of``; and (m,) the region of
-        each. None of a region with a corner where no edge ends: two of its edges cross."""
-        known = np.column_stack([np.repeat(of, 2).astype(np.float64), flat.reshape(-1, 2)])
+        edges, ``flat`` and in ``space``, (e, 2, …), of the regions ``owner``; and (m,) the region
+        of each. None of a region with a corner where no edge ends: two of its edges cross."""
+        known = np.column_stack([np.repeat(owner, 2).astype(np.float64), flat.reshape(-1, 2)])
         corners = np.column_stack([np.repeat(which, 3).astype(np.float64), rings.reshape(-1, 2)])
         first, row = distinct(np.concatenate([known, corners]))
         origin = first[row[len(known) :]]

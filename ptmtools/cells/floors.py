@@ -27,9 +27,8 @@ import shapely
 from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges, sum_by_group
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.planar import Geometry, united_by
-from ptmtools.cells.planes import PLAN, Frame, bounds
-from ptmtools.cells.polyhedron import Polyhedron, section
+from ptmtools.cells.planar import Geometry, unite_rows
+from ptmtools.cells.planes import PLAN, PlaneFrame, Polyhedron, bounds, section
 from ptmtools.cells.portals import FLOOR_COSINE, plumb
 from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import distinct
@@ -52,15 +51,15 @@ class Floors:
     patch: Bools  # (r,) whether it is one
 
     @staticmethod
-    def of(scene: Scene, detail: Bools, grain: float = 0.0) -> Floors:
+    def from_scene(scene: Scene, detail: Bools, grain: float = 0.0) -> Floors:
         """The floors of a scene but for its ``detail``, (T,); ``grain``: side of a patch, metres,
         none for 0."""
         normal = normals(scene.corners)
         steep = np.abs(normal[:, 1]) <= FLOOR_COSINE * np.linalg.norm(normal, axis=1)
         level = np.flatnonzero(~(steep | detail))
-        mesh = Welded.of(scene.points, scene.triangles[level])
-        facets = Facets.of(mesh, scene.tolerance)
-        corners, source = facets.fewer(np.ones(len(mesh.source), dtype=bool), scene.tolerance)
+        mesh = Welded.from_triangles(scene.points, scene.triangles[level])
+        facets = Facets.from_mesh(mesh, scene.tolerance)
+        corners, source = facets.reduce(np.ones(len(mesh.source), dtype=bool), scene.tolerance)
         above = (scene.two_sided | (normal[:, 1] > 0))[level[mesh.source]]
         above = np.bincount(facets.region, above, len(facets.area)) > 0
         region, front = facets.region[source], above[facets.region[source]]
@@ -90,7 +89,7 @@ class Floors:
         result = np.full(len(regions), shapely.Polygon(), dtype=object)
         patch = self.patch[regions]
         some = ~patch[owner]
-        names, united = united_by(owner[some], shapely.polygons(flat[some]), grid, more=True)
+        names, united = unite_rows(owner[some], shapely.polygons(flat[some]), grid, more=True)
         result[names] = united
         if patch.any():
             points, place = flat[~some].reshape(-1, 2), np.cumsum(patch) - 1
@@ -129,13 +128,13 @@ def _slopes(corners: Floats, region: Ints, patch: Bools) -> Floats:
 
 def detail_of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Bools:
     """(T,) which triangles are detail, including glass."""
-    roles = Designated.of(scene, options)
+    roles = Designated.from_options(scene, options)
     detail = roles.detail.copy()
     detail[structure.detail] = True
     glass = np.flatnonzero(~(scene.opaque | detail | roles.structural))
     if options.detail_by_shape and len(glass):
-        mesh = Welded.of(scene.points, scene.triangles[glass])
-        source, facets = glass[mesh.source], Facets.of(mesh, scene.tolerance)
+        mesh = Welded.from_triangles(scene.points, scene.triangles[glass])
+        source, facets = glass[mesh.source], Facets.from_mesh(mesh, scene.tolerance)
         detail[source] = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
     return detail
 
@@ -237,8 +236,8 @@ def ceiling_plane(
     low, high = body.points[:, 1].min(), body.points[:, 1].max()
     if min(height - low, high - height) < tolerance.thin:
         return None
-    frame = Frame.of(np.array([0.0, 1.0, 0.0, -height]))
-    near = structure.nearby.between(frame.plane, -tolerance.plane, tolerance.plane)
-    blocking = structure.united(frame, near[structure.lie_in(frame.plane, near)])
+    frame = PlaneFrame.from_plane(np.array([0.0, 1.0, 0.0, -height]))
+    near = structure.nearby.find_between(frame.plane, -tolerance.plane, tolerance.plane)
+    blocking = structure.unite(frame, near[structure.lie_in(frame.plane, near)])
     outline = section(body, frame.plane, tolerance.rounding)
     return WallPlane(frame, shapely.Polygon(frame.to_plane(outline)), blocking)

@@ -63,7 +63,7 @@ class Groups(ABC):
             self.near[a][c] = self.near[c][a] = both
         return [(a, c) for c in changed]
 
-    def grown(self, joins: Callable[[float], bool]) -> Ints:
+    def grow(self, joins: Callable[[float], bool]) -> Ints:
         """(L,) the group of each leaf, once all pairs are joined whose cost ``joins``; equally
         cheap ones in the order of their names."""
         waiting: list[tuple[float, int, int]] = []
@@ -118,9 +118,9 @@ def join_by_gain(
     every = np.stack([volume, area], axis=1)
     more = pairs if above is None else np.concatenate([pairs, above])
     parted = _Parted(sees.copy(), every.copy(), every, more)
-    group = parted.grown(lambda gained: gained < gain)
+    group = parted.grow(lambda gained: gained < gain)
     attached = _Attached(parted.sees, parted.own, every, group[pairs])
-    return attached.grown_by(ATTACHED * gain)[group]
+    return attached.grow_by(ATTACHED * gain)[group]
 
 
 class _Costs(Groups):
@@ -138,7 +138,7 @@ class _Costs(Groups):
             cost(row, sum_of_group, every) for row, sum_of_group in zip(sees, sums, strict=True)
         ]
 
-    def together(self, a: int, b: int) -> float:
+    def joint_cost(self, a: int, b: int) -> float:
         """The cost of two groups joined."""
         return cost(self.sees[a] | self.sees[b], self.own[a] + self.own[b], self.every)
 
@@ -156,7 +156,7 @@ class _Parted(_Costs):
     def cost(self, a: int, b: int) -> float:
         if not (self.own[a][0] and self.own[b][0]):
             return np.inf
-        together = self.together(a, b)
+        together = self.joint_cost(a, b)
         gain = 1 - (self.before[a] + self.before[b]) / together if together > 0 else 0.0
         return round(gain, DIGITS)
 
@@ -176,19 +176,19 @@ class _Attached(_Costs):
         self._all = sum(self.before)
         self._added = 0.0
 
-    def grown_by(self, share: float) -> Ints:
+    def grow_by(self, share: float) -> Ints:
         """(L,) the groups, before joining has added ``share``; none is joined for 0."""
-        return self.grown(lambda added: self._added + added < share)
+        return self.grow(lambda added: self._added + added < share)
 
     def cost(self, a: int, b: int) -> float:
         if self.own[a][0] and self.own[b][0]:
             return np.inf
-        added = self.together(a, b) - self.before[a] - self.before[b]
+        added = self.joint_cost(a, b) - self.before[a] - self.before[b]
         return round(added / self._all, 2 * DIGITS) if self._all else 0.0
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         self._added += self.cost(a, b)
-        self.before[a] = self.together(a, b)
+        self.before[a] = self.joint_cost(a, b)
         return super().join(a, b)
 
 
@@ -203,10 +203,10 @@ def gain_of(sees: Bools, every: Floats, group: Ints) -> float:
     """The gain of dividing everything into groups, (L,), of leaves that see, (L, L), one another;
     ``every``: (L, 2) their volumes and areas."""
 
-    def joined(members: Bools) -> float:
+    def cost_of(members: Bools) -> float:
         seen = np.asarray(sees[members].any(axis=0))
         return cost(seen, every[members].sum(axis=0), every)
 
-    together = joined(np.ones(len(group), dtype=np.bool_))
-    apart = sum(joined(group == name) for name in np.unique(group))
+    together = cost_of(np.ones(len(group), dtype=np.bool_))
+    apart = sum(cost_of(group == name) for name in np.unique(group))
     return 1 - apart / together if together > 0 else 0.0

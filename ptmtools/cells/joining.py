@@ -2,7 +2,7 @@
 
 A triangle all of whose pieces have the same owners is restored to the last bit. Of the others, and
 of triangles that continue each other (`patches`), pieces with the same owners are united
-(`outlines`) and divided into triangles anew (`planar.triangulated`).
+(`outlines`) and divided into triangles anew (`planar.triangulate_rings`).
 
 No position is new, a corner is removed from all triangles that have it or from none, and a corner
 on a shared edge is in all triangles of the edge. So no new gaps open. Only triangles of several
@@ -26,8 +26,8 @@ from ptmtools.cells.outlines import (
     unite_edges,
 )
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.planar import triangulated
-from ptmtools.cells.search import connected, distinct, first_alike, welded
+from ptmtools.cells.planar import triangulate_rings
+from ptmtools.cells.search import connect, distinct, first_alike, weld
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
@@ -46,26 +46,26 @@ def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: T
     An edge is left alone unless all triangles there continue each other in pairs: a wall that
     stands on a floor ends in its edges.
     """
-    edge, one, other = _opposite(corner)
+    edge, i, j = _opposite(corner)
     corners, uv = scene.corners[triangle], scene.uv[triangle]
     if scene.colors is not None:  # they differ where they are a level of 255 apart
         uv = np.concatenate([uv, 2 * _UV * scene.colors[triangle].astype(np.float64)], axis=2)
     if scene.normal_uv is not None:
         uv = np.concatenate([uv, scene.normal_uv[triangle]], axis=2)
-    flat, same = _continues(corners, uv, one // 3, other // 3, tolerance)
-    back = _continues(corners, uv, other // 3, one // 3, tolerance)
+    flat, same = _continues(corners, uv, i // 3, j // 3, tolerance)
+    back = _continues(corners, uv, j // 3, i // 3, tolerance)
     flat, same = flat & back[0], same & back[1]
-    paired = np.bincount(np.append(one[flat], other[flat]), minlength=corner.size) == 1
+    paired = np.bincount(np.append(i[flat], j[flat]), minlength=corner.size) == 1
     alone = np.zeros(int(edge.max(initial=-1)) + 1, dtype=np.bool_)
     alone[edge[~paired]] = True
-    joins = flat & same & ~alone[edge[one]]
-    one, other = one[joins] // 3, other[joins] // 3
+    joins = flat & same & ~alone[edge[i]]
+    i, j = i[joins] // 3, j[joins] // 3
     for look in (scene.triangle_object, scene.triangle_material, scene.two_sided, may):
-        each = look if look is may else look[triangle]
-        alike = each[one] == each[other]
-        one, other = one[alike], other[alike]
-    one, other = one[may[one]], other[may[one]]
-    group = connected(len(triangle), np.stack([one, other], axis=1))
+        attribute = look if look is may else look[triangle]
+        alike = attribute[i] == attribute[j]
+        i, j = i[alike], j[alike]
+    i, j = i[may[i]], j[may[i]]
+    group = connect(len(triangle), np.stack([i, j], axis=1))
     # Named by its largest triangle, of which all others must be continuations: many small steps
     # lead around a column.
     order = np.lexsort((np.arange(len(group)), -areas(corners), group))
@@ -73,11 +73,11 @@ def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: T
     largest = np.empty(len(group), dtype=np.int64)
     largest[group[first]] = first
     largest = largest[group]
-    own = np.arange(len(group))
-    fits = np.logical_and(*_continues(corners, uv, largest, own, tolerance)) | (largest == own)
+    row = np.arange(len(group))
+    fits = np.logical_and(*_continues(corners, uv, largest, row, tolerance)) | (largest == row)
     stray = np.zeros(len(group), dtype=np.bool_)
     stray[group[~fits]] = True
-    return np.where(stray[group], own, largest)
+    return np.where(stray[group], row, largest)
 
 
 def _opposite(corner: Ints) -> tuple[Ints, Ints, Ints]:
@@ -92,32 +92,36 @@ def _opposite(corner: Ints) -> tuple[Ints, Ints, Ints]:
     place = np.arange(len(order))
     last = np.searchsorted(edge[order], edge[order], "right") - 1
     more = np.where(users <= _MOST, last - place, 0)
-    one, other = np.repeat(order, more), order[ranges(place + 1, more)]
-    opposite = start[one] == end[other]
-    return edge, one[opposite], other[opposite]
+    i, j = np.repeat(order, more), order[ranges(place + 1, more)]
+    opposite = start[i] == end[j]
+    return edge, i[opposite], j[opposite]
 
 
 def _continues(
-    corners: Floats, uv: Floats, one: Ints, other: Ints, tolerance: Tolerance
+    corners: Floats, uv: Floats, triangle: Ints, candidate: Ints, tolerance: Tolerance
 ) -> tuple[Bools, Bools]:
-    """Whether triangles ``other`` lie in the planes of triangles ``one`` and face the same way, and
-    whether their texture coordinates (and colours) continue those of ``one``."""
-    origin = corners[one, 0]
-    a, b = corners[one, 1] - origin, corners[one, 2] - origin
+    """Whether each ``candidate`` lies in the plane of a ``triangle`` and faces the same way, and
+    whether its texture coordinates (and colours) continue those of the latter."""
+    origin = corners[triangle, 0]
+    a, b = corners[triangle, 1] - origin, corners[triangle, 2] - origin
     aa, ab, bb = (np.einsum("ij,ij->i", p, q) for p, q in ((a, a), (a, b), (b, b)))
     across = normals(corners)
-    flat = np.einsum("ij,ij->i", across[one], across[other]) > 0
-    same = np.ones(len(one), dtype=np.bool_)
+    flat = np.einsum("ij,ij->i", across[triangle], across[candidate]) > 0
+    same = np.ones(len(triangle), dtype=np.bool_)
     with np.errstate(divide="ignore", invalid="ignore"):  # one without area is continued by none
         scale = 1 / (aa * bb - ab**2)
         for k in range(3):
-            to = corners[other, k] - origin
+            to = corners[candidate, k] - origin
             to_a, to_b = (np.einsum("ij,ij->i", to, side) for side in (a, b))
             x = ((bb * to_a - ab * to_b) * scale)[:, None]
             y = ((aa * to_b - ab * to_a) * scale)[:, None]
             flat &= np.linalg.norm(to - x * a - y * b, axis=1) <= tolerance.file
-            expected = uv[one, 0] + x * (uv[one, 1] - uv[one, 0]) + y * (uv[one, 2] - uv[one, 0])
-            same &= np.abs(expected - uv[other, k]).max(axis=1) <= _UV
+            expected = (
+                uv[triangle, 0]
+                + x * (uv[triangle, 1] - uv[triangle, 0])
+                + y * (uv[triangle, 2] - uv[triangle, 0])
+            )
+            same &= np.abs(expected - uv[candidate, k]).max(axis=1) <= _UV
     return flat, same
 
 
@@ -125,7 +129,7 @@ _NO_OWNER = -1
 
 
 @dataclass(frozen=True)
-class Mesh:
+class CutMesh:
     """The geometry cut to the cells; the attributes are those of `Cells`."""
 
     vertex: Floats
@@ -158,7 +162,7 @@ class _Parts:
 
 def join_pieces(
     scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: Tolerance
-) -> Mesh:
+) -> CutMesh:
     """Join pieces with the same ``owner``: (M, 2) the cells in front of and behind each piece, -1
     for none. Pieces without owners are dropped."""
     count = len(scene.triangles)
@@ -182,7 +186,7 @@ def join_pieces(
     )
     ready = _Parts(scene.corners[whole], scene.uv[whole], whole, owner[first[whole]])
     return _mesh(
-        [ready, *_Network.of(scene, cut, parted, tolerance).parts(scene)],
+        [ready, *_Network.from_pieces(scene, cut, parted, tolerance).parts(scene)],
         _emitters(scene, pieces.source, owner),
     )
 
@@ -232,36 +236,38 @@ class _Network:
     reach: float
 
     @staticmethod
-    def of(scene: Scene, cut: _Cut, parted: Bools, tolerance: Tolerance) -> _Network:
+    def from_pieces(scene: Scene, cut: _Cut, parted: Bools, tolerance: Tolerance) -> _Network:
         reach = tolerance.rounding
-        triangle, of = np.unique(cut.source, return_inverse=True)
+        triangle, triangle_of_piece = np.unique(cut.source, return_inverse=True)
         model = scene.corners[triangle]
         points = np.concatenate([model.reshape(-1, 3), cut.corner[..., :3].reshape(-1, 3)])
         # The model's own corners stay distinct, however near each other.
-        same, number = first_alike(points), welded(points, reach)
+        same, number = first_alike(points), weld(points, reach)
         number = np.where(same < model.size // 3, same, number)
         whole, corner = np.split(number.reshape(-1, 3), [len(triangle)])
         sound = (corner != np.roll(corner, 1, axis=1)).all(axis=1)
-        corner, of = corner[sound], of[sound]
+        corner, triangle_of_piece = corner[sound], triangle_of_piece[sound]
         cut = _Cut(cut.corner[sound], cut.source[sound], cut.owner[sound])
 
         piece = np.repeat(np.arange(len(corner)), 3)
         edges = Edges(corner.reshape(-1), np.roll(corner, -1, axis=1).reshape(-1), piece)
         start = cut.corner[..., 3:].reshape(-1, 3)
         end = np.roll(cut.corner[..., 3:], -1, axis=1).reshape(-1, 3)
-        lines = _lines(whole, of, edges, start, end)
+        lines = _lines(whole, triangle_of_piece, edges, start, end)
         parts, edge, place = split_at_corners(points, edges, lines, reach)
         group = patches(scene, triangle, whole, parted[triangle], tolerance)
-        _, kind = np.unique(np.column_stack([group[of], cut.owner]), axis=0, return_inverse=True)
+        _, kind = np.unique(
+            np.column_stack([group[triangle_of_piece], cut.owner]), axis=0, return_inverse=True
+        )
         fixed = np.zeros(len(points), dtype=np.bool_)
         fixed[whole] = True
         return _Network(
             cut=cut,
             points=points,
-            name=triangle[group[of]],
+            name=triangle[group[triangle_of_piece]],
             corner=corner,
             kind=kind.reshape(-1),
-            frame=_frames(model)[group[of]],
+            frame=_frames(model)[group[triangle_of_piece]],
             fixed=fixed,
             edges=parts,
             weight=start[edge] + place[:, None] * (end[edge] - start[edge]),
@@ -276,24 +282,29 @@ class _Network:
         while True:
             kind = np.where(apart, len(self.points) + np.arange(count), self.kind)
             outline, union = unite_edges(self.edges, kind)
-            row, of = self._triangles(outline, fixed)
+            row, union_of = self._triangles(outline, fixed)
             done = np.zeros(count, dtype=np.bool_)
-            done[of] = True
+            done[union_of] = True
             lost = ~done[union] & ~apart
             if not lost.any():
                 break
             apart |= lost
             fixed[self.edges.start[lost[self.edges.polygon]]] = True
-        left = np.flatnonzero(~done[union])  # pieces alone that cannot be divided either
+        undivided = np.flatnonzero(~done[union])  # pieces alone that cannot be divided either
         corner = outline.start[row]
-        at = self._first_starts(union, of[:, None] * len(self.points) + corner)
+        at = self._first_starts(union, union_of[:, None] * len(self.points) + corner)
         source = self.cut.source[self.edges.polygon[at]]
         uv = np.einsum("mcw,mcwk->mck", self.weight[at], scene.uv[source])
-        weight = self.cut.corner[left, :, 3:]
-        left_uv = np.einsum("mcw,mwk->mck", weight, scene.uv[self.cut.source[left]])
+        weight = self.cut.corner[undivided, :, 3:]
+        undivided_uv = np.einsum("mcw,mwk->mck", weight, scene.uv[self.cut.source[undivided]])
         return [
-            _Parts(self.points[corner], uv, self.name[of], self.cut.owner[of]),
-            _Parts(self.points[self.corner[left]], left_uv, self.name[left], self.cut.owner[left]),
+            _Parts(self.points[corner], uv, self.name[union_of], self.cut.owner[union_of]),
+            _Parts(
+                self.points[self.corner[undivided]],
+                undivided_uv,
+                self.name[undivided],
+                self.cut.owner[undivided],
+            ),
         ]
 
     def _triangles(self, outline: Edges, fixed: Bools) -> tuple[Ints, Ints]:
@@ -332,7 +343,7 @@ class _Network:
         polygon = polygon.reshape(-1)
         # 4. Unions with one outer loop are divided into triangles: (m, 3) rows of ``row``.
         start = np.append(0, np.cumsum(size[order]))
-        triangle, owner = triangulated(flat[row, 0], start, polygon)
+        triangle, owner = triangulate_rings(flat[row, 0], start, polygon)
         simple = np.bincount(polygon, area[order] > 0) == 1
         triangle, owner = triangle[simple[owner]], owner[simple[owner]]
         return row[triangle], unions[owner]
@@ -344,14 +355,14 @@ class _Network:
         return np.asarray(first[np.searchsorted(known, key)])
 
 
-def _lines(whole: Ints, of: Ints, edges: Edges, start: Floats, end: Floats) -> Ints:
+def _lines(whole: Ints, triangle_of_piece: Ints, edges: Edges, start: Floats, end: Floats) -> Ints:
     """(n,) numbers of the lines on which edges of pieces may overlap: an edge of the model, shared
     by all its triangles, or the inside of a triangle.
 
-    ``whole``: (T, 3) the corners of the triangles; ``of``: (K,) the triangle of each piece;
+    ``whole``: (T, 3) the corners of the triangles; ``triangle_of_piece``: (K,) that of each piece;
     ``start``, ``end``: (n, 3) the ends of the edges, barycentric.
     """
-    inside = of[edges.polygon]
+    inside = triangle_of_piece[edges.polygon]
     # Cuts do not change a coordinate of 0.
     on = (start == 0) & (end == 0)
     # The side opposite to corner k begins in the next.
@@ -359,7 +370,7 @@ def _lines(whole: Ints, of: Ints, edges: Edges, start: Floats, end: Floats) -> I
     _, side = np.unique(code, return_inverse=True)
     side = side.reshape(-1, 3)[inside, on.argmax(axis=1)]
     # Inside most edges have cancelled already, which leaves few corners to compare the others with.
-    number, way = edges.numbered()
+    number, way = edges.number_ends()
     _, number = np.unique(number * len(whole) + inside, return_inverse=True)
     number = number.reshape(-1)
     matched = np.bincount(number, way)[number] == 0
@@ -377,14 +388,14 @@ def _frames(corners: Floats) -> Floats:
     return np.asarray(np.divide(frame, length, out=np.zeros_like(frame), where=length > 0))
 
 
-def _mesh(parts: list[_Parts], emitters: Ints) -> Mesh:
+def _mesh(parts: list[_Parts], emitters: Ints) -> CutMesh:
     """Parts in the order of the model's triangles, with the vertices that they share."""
     columns = zip(*(vars(part).values() for part in parts), strict=True)
     point, uv, source, owner = (np.concatenate(column) for column in columns)
     order = np.argsort(source, kind="stable")
     rows = np.concatenate([point, uv], axis=2)[order].reshape(-1, 5) + 0.0
     used, index = distinct(rows)
-    return Mesh(
+    return CutMesh(
         vertex=rows[used, :3].copy(),
         vertex_uv=rows[used, 3:].copy(),
         triangle=index.reshape(-1, 3).astype(np.int32),

@@ -65,20 +65,25 @@ def grow_regions(
             py = point[base, 1] + my / weight
             pz = point[base, 2] + mz / weight
             for k in range(3):
-                other = beyond[t, k]
-                if other < 0 or region[other] >= 0:
+                neighbour = beyond[t, k]
+                if neighbour < 0 or region[neighbour] >= 0:
                     continue
-                if normal[other, 0] * nx + normal[other, 1] * ny + normal[other, 2] * nz <= 0.0:
+                if (
+                    normal[neighbour, 0] * nx
+                    + normal[neighbour, 1] * ny
+                    + normal[neighbour, 2] * nz
+                    <= 0.0
+                ):
                     continue
                 flat = True
                 for c in range(3):
-                    v = triangle[other, c]
+                    v = triangle[neighbour, c]
                     away = nx * (point[v, 0] - px) + ny * (point[v, 1] - py)
                     away += nz * (point[v, 2] - pz)
                     flat &= abs(away) <= slack * size
                 if flat:
-                    region[other] = count
-                    queue[tail] = other
+                    region[neighbour] = count
+                    queue[tail] = neighbour
                     tail += 1
         count += 1
     return count

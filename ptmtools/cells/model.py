@@ -16,6 +16,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +42,11 @@ class EyeRegion:
         """Whether eyes may be anywhere."""
         return not len(self._floor)
 
-    def about(self, low: Floats, high: Floats) -> bool:
+    def is_near(self, low: Floats, high: Floats) -> bool:
         """Whether any of its floor is near the box between two corners."""
         return len(self._nearby.meeting(low - [0, self._reach, 0], high)) > 0
 
-    def clipped(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    def clip(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         """The part of the box between two corners where eyes can be, as a box; unchanged if that
         part is flat or empty."""
         corners = self._floor[self._nearby.meeting(low - [0, self._reach, 0], high)].reshape(-1, 3)
@@ -313,68 +314,18 @@ class Cells:
         stored = Stored(arrays)
         about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())
         leaf_cell = stored.array("leaf_cell", np.int32, None)
-        leaves = len(leaf_cell)
-        stored.indices("leaf_cell", np.int32, leaves, low=-1, high=leaves)
-        leaf_point = stored.array("leaf_point", np.float64, None, 3, finite=True)
-        face_index = stored.indices("face_index", np.int32, None, high=len(leaf_point))
-        face_start = stored.starts("face_start", None, len(face_index))
-        node_plane = stored.array("node_plane", np.float64, None, 4, finite=True)
-        nodes = len(node_plane)
-        node_child = stored.indices("node_child", np.int32, nodes, 2, low=-1 - leaves, high=nodes)
-        if ((node_child >= 0) & (node_child <= np.arange(nodes)[:, None])).any():
-            raise ValueError("node_child leads back")
-        portal_point = stored.array("portal_point", np.float64, None, 3, finite=True)
-        portal_leaf = stored.indices("portal_leaf", np.int32, None, 2, high=leaves)
-        portals = len(portal_leaf)
-        vertex = stored.array("vertex", np.float64, None, 3, finite=True)
-        triangle = stored.indices("triangle", np.int32, None, 3, high=len(vertex))
-        n = len(triangle)
-        stored = stored.repeated(len(vertex), "vertex_uv").repeated(n, "triangle_cell")
-        cells = int(leaf_cell.max()) + 1 if leaves else 0
-        leaf_point_start = stored.starts("leaf_point_start", leaves, len(leaf_point))
-        leaf_face_start = stored.starts("leaf_face_start", leaves, len(face_start) - 1)
-        portal_start = stored.starts("portal_start", portals, len(portal_point))
-        for name, start, least in (
-            ("face", face_start, 3),
-            ("leaf", leaf_point_start, 4),
-            ("leaf", leaf_face_start, 4),
-            ("portal", portal_start, 3),
-        ):
-            if (np.diff(start) < least).any():
-                raise ValueError(f"a {name} is flat")
+        leaves, cells = len(leaf_cell), int(leaf_cell.max(initial=-1)) + 1
         rooms = texts(about.get("rooms", []), "rooms")
         cell_room = np.zeros(0, dtype=np.int32)
         if rooms:
             cell_room = stored.indices("cell_room", np.int32, cells, low=-1, high=len(rooms))
-        passage = stored.array("portal_passage", np.bool_, portals)
-        if (passage[:-1] > passage[1:]).any():
-            raise ValueError("portal_passage does not ascend")
-        corners = stored.array("eye_point", np.float64, None, 3, finite=True)
-        eye_floor = corners[stored.indices("eye_floor", np.int32, None, 3, high=len(corners))]
+        eyes = stored.array("eye_point", np.float64, None, 3, finite=True)
         return Cells(
-            node_plane=node_plane,
-            node_child=node_child,
-            root_box=stored.array("root_box", np.float64, 2, 3, finite=True),
-            leaf_cell=leaf_cell,
-            leaf_standing=stored.array("leaf_standing", np.bool_, leaves),
-            leaf_point=leaf_point,
-            leaf_point_start=leaf_point_start,
-            face_index=face_index,
-            face_start=face_start,
-            leaf_face_start=leaf_face_start,
-            portal_leaf=portal_leaf,
-            portal_plane=stored.array("portal_plane", np.float64, portals, 4, finite=True),
-            portal_point=portal_point,
-            portal_start=portal_start,
-            portal_area=stored.array("portal_area", np.float64, portals, finite=True),
-            portal_passage=passage,
-            vertex=vertex,
-            vertex_uv=stored.array("vertex_uv", np.float64, len(vertex), 2, finite=True),
-            triangle=triangle,
-            triangle_source=stored.indices("triangle_source", np.int32, n, high=1 << 31),
-            triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
+            **_read_leaves(stored, leaves),
+            **_read_portals(stored, leaves),
+            **_read_geometry(stored, cells),
             tolerance=Tolerance.from_arrays(arrays),
-            eye_floor=eye_floor,
+            eye_floor=eyes[stored.indices("eye_floor", np.int32, None, 3, high=len(eyes))],
             left_out=stored.array("left_out", np.float64, None, 3, 3, finite=True),
             walker=Walker(*map(float, about["walker"])),
             ceiling=None if about["ceiling"] is None else float(about["ceiling"]),
@@ -384,8 +335,74 @@ class Cells:
             owners=int(about["owners"]),
             rooms=rooms,
             cell_room=cell_room,
-            opened=stored.indices("opened", np.int32, None, high=1 << 31),
         )
+
+
+def _read_leaves(stored: Stored, leaves: int) -> dict[str, NDArray[Any]]:
+    """The tree and its leaves, checked, by their names in `Cells`."""
+    planes = stored.array("node_plane", np.float64, None, 4, finite=True)
+    nodes = len(planes)
+    children = stored.indices("node_child", np.int32, nodes, 2, low=-1 - leaves, high=nodes)
+    if ((children >= 0) & (children <= np.arange(nodes)[:, None])).any():
+        raise ValueError("node_child leads back")
+    points = stored.array("leaf_point", np.float64, None, 3, finite=True)
+    corners = stored.indices("face_index", np.int32, None, high=len(points))
+    face_start = _solid_starts(stored, "face_start", None, len(corners), 3)
+    return {
+        "node_plane": planes,
+        "node_child": children,
+        "root_box": stored.array("root_box", np.float64, 2, 3, finite=True),
+        "leaf_cell": stored.indices("leaf_cell", np.int32, leaves, low=-1, high=leaves),
+        "leaf_standing": stored.array("leaf_standing", np.bool_, leaves),
+        "leaf_point": points,
+        "leaf_point_start": _solid_starts(stored, "leaf_point_start", leaves, len(points), 4),
+        "face_index": corners,
+        "face_start": face_start,
+        "leaf_face_start": _solid_starts(stored, "leaf_face_start", leaves, len(face_start) - 1, 4),
+    }
+
+
+def _read_portals(stored: Stored, leaves: int) -> dict[str, NDArray[Any]]:
+    """The portals, checked, by their names in `Cells`."""
+    points = stored.array("portal_point", np.float64, None, 3, finite=True)
+    ends = stored.indices("portal_leaf", np.int32, None, 2, high=leaves)
+    passage = stored.array("portal_passage", np.bool_, len(ends))
+    if (passage[:-1] > passage[1:]).any():
+        raise ValueError("portal_passage does not ascend")
+    return {
+        "portal_leaf": ends,
+        "portal_plane": stored.array("portal_plane", np.float64, len(ends), 4, finite=True),
+        "portal_point": points,
+        "portal_start": _solid_starts(stored, "portal_start", len(ends), len(points), 3),
+        "portal_area": stored.array("portal_area", np.float64, len(ends), finite=True),
+        "portal_passage": passage,
+    }
+
+
+def _read_geometry(stored: Stored, cells: int) -> dict[str, NDArray[Any]]:
+    """The pieces of the model, checked, by their names in `Cells`."""
+    vertex = stored.array("vertex", np.float64, None, 3, finite=True)
+    triangle = stored.indices("triangle", np.int32, None, 3, high=len(vertex))
+    n = len(triangle)
+    stored = stored.repeated(len(vertex), "vertex_uv").repeated(n, "triangle_cell")
+    return {
+        "vertex": vertex,
+        "vertex_uv": stored.array("vertex_uv", np.float64, len(vertex), 2, finite=True),
+        "triangle": triangle,
+        "triangle_source": stored.indices("triangle_source", np.int32, n, high=1 << 31),
+        "triangle_cell": stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
+        "opened": stored.indices("opened", np.int32, None, high=1 << 31),
+    }
+
+
+def _solid_starts(
+    stored: Stored, name: str, rows: int | None, total: int, least: int
+) -> NDArray[np.int64]:
+    """The row starts of a CSR whose rows have at ``least`` so many entries: none is flat."""
+    start = stored.starts(name, rows, total)
+    if (np.diff(start) < least).any():
+        raise ValueError(f"{name} has a flat row")
+    return start
 
 
 def descend(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, ranges
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 
 #: Number of pairs of an edge and a corner that are compared at a time.
 _CHUNK = 1 << 21
@@ -30,7 +30,7 @@ class Edges:
     def take(self, rows: Ints | Bools) -> Edges:
         return Edges(self.start[rows], self.end[rows], self.polygon[rows])
 
-    def numbered(self) -> tuple[Ints, Ints]:
+    def number_ends(self) -> tuple[Ints, Ints]:
         """(n,) numbers, equal for edges with the same two ends, and (n,) 1 or -1 by direction."""
         low, high = np.minimum(self.start, self.end), np.maximum(self.start, self.end)
         code = low * (int(high.max(initial=0)) + 1) + high
@@ -88,8 +88,8 @@ def _on_edges(points: Floats, edges: Edges, line: Ints, reach: float) -> tuple[I
     for part in np.split(row, np.flatnonzero(np.diff(chunk)) + 1):
         edge = np.repeat(part, many[part])
         corner = of_axis[axis[edge], ranges(from_[part], many[part])]
-        other = (corner != edges.start[edge]) & (corner != edges.end[edge])
-        edge, corner = edge[other], corner[other]
+        inner = (corner != edges.start[edge]) & (corner != edges.end[edge])
+        edge, corner = edge[inner], corner[inner]
         way, ahead = ends[1, edge] - ends[0, edge], points[corner] - ends[0, edge]
         place = np.einsum("ij,ij->i", ahead, way) / np.einsum("ij,ij->i", way, way)
         off = ahead - place[:, None] * way
@@ -102,35 +102,35 @@ def _on_edges(points: Floats, edges: Edges, line: Ints, reach: float) -> tuple[I
 def unite_edges(edges: Edges, kind: Ints) -> tuple[Edges, Ints]:
     """The edges that remain when polygons of one ``kind``, (polygons,), that share edges are
     united; and (polygons,) the first polygon of the union of each, which names the union."""
-    number, way = edges.numbered()
-    of = kind[edges.polygon]
-    order = np.lexsort((number, of))
+    number, way = edges.number_ends()
+    kind_of_edge = kind[edges.polygon]
+    order = np.lexsort((number, kind_of_edge))
     change = np.ones(len(order), dtype=np.bool_)
-    change[1:] = (np.diff(of[order]) != 0) | (np.diff(number[order]) != 0)
+    change[1:] = (np.diff(kind_of_edge[order]) != 0) | (np.diff(number[order]) != 0)
     first = np.flatnonzero(change)
     # Pairs of opposite edges cancel; overlapping polygons may have any number, which remain.
     first = first[np.diff(np.append(first, len(order))) == 2]
-    one, other = order[first], order[first + 1]
-    opposite = way[one] != way[other]
-    one, other = one[opposite], other[opposite]
+    i, j = order[first], order[first + 1]
+    opposite = way[i] != way[j]
+    i, j = i[opposite], j[opposite]
     stays = np.ones(len(order), dtype=np.bool_)
-    stays[one] = stays[other] = False
-    union = connected(len(kind), edges.polygon[np.stack([one, other], axis=1)])
-    left = edges.take(stays)
-    return Edges(left.start, left.end, union[left.polygon]), union
+    stays[i] = stays[j] = False
+    union = connect(len(kind), edges.polygon[np.stack([i, j], axis=1)])
+    remaining = edges.take(stays)
+    return Edges(remaining.start, remaining.end, union[remaining.polygon]), union
 
 
 def straight_corners(points: Floats, edges: Edges, reach: float) -> Ints:
     """The corners, ascending, at which all edges continue along one straight line."""
-    number, _ = edges.numbered()
-    _, one = np.unique(number, return_index=True)
-    start, end = edges.start[one], edges.end[one]
+    number, _ = edges.number_ends()
+    _, representative = np.unique(number, return_index=True)
+    start, end = edges.start[representative], edges.end[representative]
     ends, beyond = np.append(start, end), np.append(end, start)
     order = np.argsort(ends, kind="stable")
     corner, first, count = np.unique(ends[order], return_index=True, return_counts=True)
     first, corner = first[count == 2], corner[count == 2]
     before, after = points[beyond[order[first]]], points[beyond[order[first + 1]]]
-    return np.asarray(corner[_between(points[corner], before, after, reach)])
+    return np.asarray(corner[_lie_between(points[corner], before, after, reach)])
 
 
 def bent_corners(point: Floats, start: Ints, gone: Bools, reach: float) -> Ints:
@@ -149,10 +149,10 @@ def bent_corners(point: Floats, start: Ints, gone: Bools, reach: float) -> Ints:
     after = np.where(after >= start[ring + 1], first[ring], after)
     some = np.flatnonzero(gone)
     ends = before[some], np.minimum(after[some], len(point) - 1)
-    return some[~_between(point[some], point[ends[0]], point[ends[1]], reach) | (ends[0] < 0)]
+    return some[~_lie_between(point[some], point[ends[0]], point[ends[1]], reach) | (ends[0] < 0)]
 
 
-def _between(point: Floats, before: Floats, after: Floats, reach: float) -> Bools:
+def _lie_between(point: Floats, before: Floats, after: Floats, reach: float) -> Bools:
     """(n,) whether (n, 3) points lie, within ``reach``, on the lines between two others each."""
     way, ahead = after - before, point - before
     with np.errstate(invalid="ignore", divide="ignore"):  # both may be one

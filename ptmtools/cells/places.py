@@ -2,8 +2,11 @@
 
 A **place** is a point of a surface within 45° of level over which an upright cylinder, the body of
 a walker from the height of a step to that of the head, meets nothing structural; in doubt the body
-fits (`clearance`). Floors are searched in blocks of neighbours, so that the time of each depends on
-the triangles about it alone.
+fits. For each flat region of floor, the part of the structure in a band of heights above it is
+projected onto it along the vertical, widened by the radius and subtracted (`clear_of`). Circles are
+polygons inside them. Floors are searched in blocks of neighbours, floors and triangles are sorted
+by storeys, and regions with many triangles about them are cut in two, so the time is proportional
+to the triangles near floors.
 
 Leaves that meet the eye region are standing. Ceilings lower than the eyes may be are ignored: a
 small cost that hides nothing.
@@ -20,17 +23,6 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints, areas, ranges
-from ptmtools.cells.clearance import (
-    CORNERS,
-    QUARTER,
-    above,
-    clear_of,
-    halves,
-    heights,
-    longest,
-    shadows,
-    tiled,
-)
 from ptmtools.cells.floors import Floors
 from ptmtools.cells.options import Walker
 from ptmtools.cells.planar import (
@@ -39,15 +31,235 @@ from ptmtools.cells.planar import (
     count,
     counting,
     delaunay,
+    difference,
     intersection,
-    straightened,
-    united_by,
+    straighten,
+    unite_rows,
 )
-from ptmtools.cells.planes import PLAN, boxes_meet
-from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.search import along_a_curve
+from ptmtools.cells.planes import PLAN, Polyhedron, boxes_meet
+from ptmtools.cells.search import ByHeight, along_a_curve
 from ptmtools.executor import Executor
-from ptmtools.tolerance import Tolerance
+from ptmtools.tolerance import TOUCH_SHARE, Tolerance
+
+#: Floors within this height, as a share of the band, are compared together.
+_STOREY = 0.2
+#: A shape of less area for its length than this share of a radius is a line.
+_THIN = 4e-3
+#: A region is compared with one of the triangles about it, then with this many times more.
+_GROWTH = 1.25
+#: Regions with more triangles about them, and shapes of more corners, are cut in two,
+_CROWD, CORNERS = 256, 256
+#: unless they are no longer than this many times the height of the band, or the margin.
+_SHORT, _NARROW = 1.2, 8.0
+#: Corners of a quarter of a circle.
+QUARTER = 4
+
+
+def clear_of(
+    corners: Floats,
+    plan: Geometry,
+    slope: Floats,
+    band: tuple[float, float],
+    radius: float,
+    tolerance: Tolerance,
+) -> tuple[Geometry, Ints]:
+    """(k,) pieces of regions of floor that are no less than a ``radius`` from triangles, (n, 3, 3),
+    as high above them as a ``band``, metres; in plan. And (k,) the region of each.
+
+    The regions are (r,) polygons in ``plan``, whose heights are a·x + b·z + c by (r, 3) ``slope``.
+    """
+    pieces, owner, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
+    by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
+    while len(region):
+        row, near = _pairs_near(corners, by_height, plan, slope, band, radius)
+        crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
+            longest(plan) > _SHORT * band[1]
+        )
+        some = ~crowded[row]
+        free = _subtract_near(plan, slope, corners[near[some]], row[some], band, radius, tolerance)
+        kept = ~crowded & ~shapely.is_empty(free)
+        pieces.append(free[kept])
+        owner.append(region[kept])
+        plan, half = halves(plan[crowded], tolerance.grid)
+        slope, region = slope[crowded][half], region[crowded][half]
+    return np.concatenate(pieces), np.concatenate(owner)
+
+
+def _pairs_near(
+    corners: Floats,
+    by_height: ByHeight,
+    plan: Geometry,
+    slope: Floats,
+    band: tuple[float, float],
+    radius: float,
+) -> tuple[Ints, Ints]:
+    """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
+    ``band``, whose boxes in plan are no more than a radius apart."""
+    least, greatest = heights(plan, slope)
+    margin = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
+    least, greatest = least - margin, greatest + margin
+    storey = np.floor(least / (_STOREY * (band[1] - band[0])))
+    rows, hits = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    flat = corners[:, :, PLAN]
+    boxes = shapely.box(*flat.min(axis=1).T, *flat.max(axis=1).T)
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
+    reach = shapely.box(x0 - radius, z0 - radius, x1 + radius, z1 + radius)
+    # Storey by storey, so that a floor is compared only with triangles of its height.
+    for name in np.unique(storey):
+        on_storey = np.flatnonzero(storey == name)
+        bottom, top = least[on_storey].min() + band[0], greatest[on_storey].max() + band[1]
+        about = by_height.find_between(bottom, top)
+        row, near = shapely.STRtree(boxes[about]).query(reach[on_storey])
+        row, near = on_storey[row], about[near]
+        height = heights_above(corners[near], slope[row])
+        meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
+        rows.append(row[meets])
+        hits.append(near[meets])
+    return np.concatenate(rows), np.concatenate(hits)
+
+
+def _subtract_near(
+    plan: Geometry,
+    slope: Floats,
+    corners: Floats,
+    row: Ints,
+    band: tuple[float, float],
+    radius: float,
+    tolerance: Tolerance,
+) -> Geometry:
+    """(r,) regions without the points less than a radius from triangles, (n, 3, 3), each near the
+    region of its ``row``.
+
+    The first few triangles leave nothing of most regions, such as the tops of mouldings, and a few
+    triangles of a large wall remove as much as all do. So they are tried by turns, those first that
+    may remove most, and only the ones that are still near the rest."""
+    low, high = corners.min(axis=1)[:, PLAN] - radius, corners.max(axis=1)[:, PLAN] + radius
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4)[row].T
+    across = np.minimum(high[:, 0], x1) - np.maximum(low[:, 0], x0)
+    along = np.minimum(high[:, 1], z1) - np.maximum(low[:, 1], z0)
+    order = np.lexsort((-across * along, row))
+    row, corners = row[order], corners[order]
+    turn = np.arange(len(row)) - np.searchsorted(row, row)
+    rest = plan.copy()
+    first, end = 0, 1
+    while (turn >= first).any():
+        at = np.flatnonzero((turn >= first) & (turn < end))
+        at = at[~shapely.is_empty(rest[row[at]])]
+        height = heights_above(corners[at], slope[row[at]])
+        caster, shadow = shadows(corners[at][:, :, PLAN], height, band, at)
+        near = shapely.dwithin(shadow, rest[row[caster]], (1 - TOUCH_SHARE) * radius)
+        shadow, target = _merge(shadow[near], row[caster[near]], radius, tolerance)
+        # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
+        wide = buffer(shadow, radius, quad_segs=QUARTER)
+        names, taken = unite_rows(target, wide, tolerance.grid)
+        rest[names] = difference(rest[names], taken, tolerance.grid)
+        first, end = end, int(_GROWTH * end) + 1
+    return rest
+
+
+def _merge(
+    shapes: Geometry, row: Ints, radius: float, tolerance: Tolerance
+) -> tuple[Geometry, Ints]:
+    """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Thin
+    ones, such as a wall's, would vanish; those without width are lines."""
+    size, around = shapely.area(shapes), shapely.length(shapes)
+    line = size <= tolerance.rounding * around
+    flat = ~line & (size > _THIN * radius * around)
+    shapes[line] = _lines(shapes[line])
+    names, united = unite_rows(row[flat], shapes[flat], tolerance.grid)
+    parts, which = shapely.get_parts(united, return_index=True)
+    return np.append(shapes[~flat], parts), np.append(row[~flat], names[which])
+
+
+def _lines(shapes: Geometry) -> Geometry:
+    """(n,) from end to end of shapes without width, of which GEOS would widen one end only."""
+    points, owner = shapely.get_coordinates(shapes, return_index=True)
+    first = np.searchsorted(owner, np.arange(len(shapes)))
+    for _ in range(2):  # the farthest point from any point is an end, and from that, the other one
+        away = np.linalg.norm(points - points[first[owner]], axis=1)
+        order = np.lexsort((-away, owner))
+        last, first = first, order[np.searchsorted(owner, np.arange(len(shapes)))]
+    return shapely.linestrings(np.stack([points[last], points[first]], axis=1))
+
+
+def longest(shapes: Geometry) -> Floats:
+    """(n,) the longer sides of the boxes around shapes."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    longer: Floats = np.maximum(x1 - x0, y1 - y0)
+    return longer
+
+
+def heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
+    """(r,) and (r,): the least and the greatest height, or a little beyond, of regions in plan."""
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
+    middle = slope[:, 0] * (x0 + x1) / 2 + slope[:, 1] * (z0 + z1) / 2 + slope[:, 2]
+    half = np.abs(slope[:, 0]) * (x1 - x0) / 2 + np.abs(slope[:, 1]) * (z1 - z0) / 2
+    return middle - half, middle + half
+
+
+def heights_above(corners: Floats, slope: Floats) -> Floats:
+    """(n, k) heights of the corners of shapes, (n, k, 3), above the slope of each, (n, 3)."""
+    plan = np.einsum("ncx,nx->nc", corners[:, :, PLAN], slope[:, :2])
+    result: Floats = corners[:, :, 1] - plan - slope[:, 2:]
+    return result
+
+
+def shadows(
+    plan: Floats, height: Floats, band: tuple[float, float], owner: Ints
+) -> tuple[Ints, Geometry]:
+    """The parts of convex bodies in a band of heights, in plan: their owners, ascending, and
+    shapes. Bodies are given by polygons or edges, (n, k, 2) in plan, (n, k) heights and (n,)
+    owners."""
+    points, valid = [plan], [(height >= band[0]) & (height <= band[1])]
+    following, after = np.roll(plan, -1, axis=1), np.roll(height, -1, axis=1)
+    for level in band:
+        crosses = (height - level) * (after - level) < 0
+        share = np.divide(level - height, after - height, out=np.zeros(height.shape), where=crosses)
+        points.append(plan + share[..., None] * (following - plan))
+        valid.append(crosses)
+    every, which = np.concatenate(points, axis=1), np.concatenate(valid, axis=1)
+    row, _ = np.nonzero(which)
+    order = np.argsort(owner[row], kind="stable")
+    names, group = np.unique(owner[row][order], return_inverse=True)
+    clouds = shapely.multipoints(every[which][order], indices=group.reshape(-1))
+    return names, np.asarray(shapely.convex_hull(clouds))
+
+
+def cut_tiles(shapes: Geometry, margin: float, grid: float) -> tuple[Geometry, Geometry, Ints]:
+    """(m,) boxes that divide the surroundings, up to a margin, of each of (n,) shapes, (m,) the
+    part of the shape up to a margin from each box, with few corners, and (m,) its shape: GEOS takes
+    more than linear time in the number of corners."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    tile = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+    which = np.arange(len(shapes))
+    tiles: list[tuple[Geometry, Geometry, Ints]] = []
+    while True:
+        large = (shapely.get_num_coordinates(shapes) > CORNERS) & (longest(tile) > _NARROW * margin)
+        tiles.append((tile[~large], shapes[~large], which[~large]))
+        if not large.any():
+            boxes, pieces, names = zip(*tiles, strict=True)
+            return np.concatenate(boxes), np.concatenate(pieces), np.concatenate(names)
+        tile, half = halves(tile[large], grid)
+        x0, y0, x1, y1 = shapely.bounds(tile).T
+        about = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+        shapes, which = shapes[large][half], which[large][half]
+        shapes = intersection(shapes, about, grid, more=True)
+
+
+def halves(shapes: Geometry, grid: float) -> tuple[Geometry, Ints]:
+    """(m,) the polygons to both sides of the middles of (n,) shapes, and (m,) the shape of each."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    middle = np.where(x1 - x0 > y1 - y0, (x0 + x1) / 2, x1)
+    level = np.where(x1 - x0 > y1 - y0, y1, (y0 + y1) / 2)
+    sides = (
+        shapely.box(x0, y0, middle, level),
+        shapely.box(np.where(middle < x1, middle, x0), np.where(level < y1, level, y0), x1, y1),
+    )
+    both = np.concatenate([intersection(shapes, side, grid, more=True) for side in sides])
+    parts, which = shapely.get_parts(both, return_index=True)
+    flat = shapely.area(parts) > 0
+    return parts[flat], which[flat] % max(len(shapes), 1)
+
 
 #: Places are sampled once in this area, m², and so often at most.
 _SAMPLE_AREA, _MOST_SAMPLES = 0.05, 500_000
@@ -67,11 +279,11 @@ class Places:
         """The regions of some rows, (r,)."""
         return Places(self.plan[rows], self.slope[rows], self.front[rows])
 
-    def near(self, boxes: Floats) -> Bools:
+    def find_near(self, boxes: Floats) -> Bools:
         """(r,) which regions have a box that meets one of (m, 2, 3) boxes, metres."""
-        least, most = heights(self.plan, self.slope)
+        least, greatest = heights(self.plan, self.slope)
         x0, z0, x1, z1 = shapely.bounds(self.plan).reshape(-1, 4).T
-        low, high = np.column_stack([x0, least, z0]), np.column_stack([x1, most, z1])
+        low, high = np.column_stack([x0, least, z0]), np.column_stack([x1, greatest, z1])
         return boxes_meet(low, high, boxes)
 
     def without_tops(self, ceiling: float, radius: float) -> Places:
@@ -86,18 +298,18 @@ class Places:
         parts, region = shapely.get_parts(self.plan, return_index=True)
         flat = shapely.get_dimensions(parts) == 2
         parts, region = parts[flat], region[flat]
-        corners, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
+        corners, owner = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
         while len(parts):
             # Of many corners, or none that GEOS can divide: cut in two, and tried again.
             large = shapely.get_num_coordinates(parts) > CORNERS
             triangles = delaunay(np.where(large, shapely.Polygon(), parts))
             pieces, part = shapely.get_parts(triangles, return_index=True)
             corners.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
-            of.append(region[part])
-            left = shapely.is_empty(triangles)
-            parts, which = halves(parts[left], tolerance.grid)
-            region = region[left][which]
-        plan, slope = np.concatenate(corners), self.slope[np.concatenate(of)]
+            owner.append(region[part])
+            undivided = shapely.is_empty(triangles)
+            parts, which = halves(parts[undivided], tolerance.grid)
+            region = region[undivided][which]
+        plan, slope = np.concatenate(corners), self.slope[np.concatenate(owner)]
         height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
         return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
@@ -123,11 +335,11 @@ def find_places(
     plans, regions, undecided = zip(*done, strict=True)
     for names in undecided:
         count(names)
-    names, plan = united_by(
+    names, plan = unite_rows(
         np.concatenate(regions), np.concatenate(plans), tolerance.grid, more=True
     )
     # Without corners on straight edges, and in an order independent of the computation.
-    plan = straightened(shapely.normalize(plan), tolerance.grid)
+    plan = straighten(shapely.normalize(plan), tolerance.grid)
     # Walls part what is inside from what is outside.
     plan, part = shapely.get_parts(plan, return_index=True)
     names = names[part]
@@ -147,9 +359,9 @@ def _tiles(floors: Floors, tolerance: Tolerance) -> tuple[Geometry, Ints]:
     region = region[some := ~shapely.is_empty(plan)]
     plan = plan[some]
     plans, regions = [plan[:0]], [region[:0]]
-    most = max(_LONG, _LONG_SHARE * tolerance.extent)
+    limit = max(_LONG, _LONG_SHARE * tolerance.extent)
     while len(plan):
-        long = longest(plan) > most
+        long = longest(plan) > limit
         plans.append(plan[~long])
         regions.append(region[~long])
         plan, half = halves(plan[long], tolerance.grid)
@@ -176,23 +388,23 @@ class _Search(NamedTuple):
         walker, tolerance = self.walker, self.tolerance
         body, foot = (walker.step, walker.height), (2 * tolerance.plane, walker.step)
         slope = self.slope[region]
-        around = self._around(self.structure, plan, walker.radius)
+        around = self._select_near(self.structure, plan, walker.radius)
         plan, part = clear_of(around, plan, slope, body, walker.radius, tolerance)
         region = region[part]
         # A foot is on the uppermost of surfaces one step apart: not on the underside of a slab.
-        around = self._around(self.floors, plan, 0.0)
+        around = self._select_near(self.floors, plan, 0.0)
         plan, part = clear_of(around, plan, self.slope[region], foot, 0.0, tolerance)
         return plan, region[part]
 
     @staticmethod
-    def _around(boxed: tuple[Floats, Floats], plan: Geometry, radius: float) -> Floats:
+    def _select_near(boxed: tuple[Floats, Floats], plan: Geometry, radius: float) -> Floats:
         """The triangles with a box, seen from above, no more than a radius from that of parts."""
         corners, (x0, z0, x1, z1) = boxed
         if not len(plan):
             return corners[:0]
-        left, low, right, high = shapely.total_bounds(plan)
-        near = (x0 <= right + radius) & (x1 >= left - radius)
-        near &= (z0 <= high + radius) & (z1 >= low - radius)
+        x_low, z_low, x_high, z_high = shapely.total_bounds(plan)
+        near = (x0 <= x_high + radius) & (x1 >= x_low - radius)
+        near &= (z0 <= z_high + radius) & (z1 >= z_low - radius)
         result: Floats = corners[near]
         return result
 
@@ -206,8 +418,8 @@ def _with_boxes(corners: Floats) -> tuple[Floats, Floats]:
 def spread(corners: Floats) -> tuple[Floats, Floats]:
     """(m, 3) points spread evenly over (n, 3, 3) triangles, and (m,) the m² of each."""
     size = areas(corners)
-    each = max(_SAMPLE_AREA, float(size.sum()) / _MOST_SAMPLES)
-    number = np.maximum(np.ceil(size / each), 1).astype(np.int64)
+    sample_area = max(_SAMPLE_AREA, float(size.sum()) / _MOST_SAMPLES)
+    number = np.maximum(np.ceil(size / sample_area), 1).astype(np.int64)
     row = np.repeat(np.arange(len(corners)), number)
     share = np.mod((ranges(np.zeros_like(number), number)[:, None] + 0.5) * _STEPS, 1.0)
     share = np.where(share.sum(axis=1, keepdims=True) > 1, 1 - share, share)
@@ -225,7 +437,7 @@ def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
     """The floor below the eyes: the places, widened by the body's radius less a slack."""
     inside = walker.radius * np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
     reach = inside - min(2 * tolerance.plane, _SLACK * walker.radius)
-    box, plan, which = tiled(places.plan, walker.radius, tolerance.grid)
+    box, plan, which = cut_tiles(places.plan, walker.radius, tolerance.grid)
     wide = buffer(plan, reach, more=True, quad_segs=QUARTER)
     eyes = intersection(wide, box, tolerance.grid, more=True)
     some = ~shapely.is_empty(eyes)
@@ -243,11 +455,11 @@ def meets(
     high = np.array([body.points.max(axis=0) for body in bodies]).reshape(-1, 3)
     boxes = shapely.box(*low[:, PLAN].T, *high[:, PLAN].T)
     leaf, floor = shapely.STRtree(eyes.plan).query(boxes, "intersects")
-    least, most = heights(eyes.plan, eyes.slope)
-    near = (high[leaf, 1] > least[floor] + band[0]) & (low[leaf, 1] < most[floor] + band[1])
+    least, greatest = heights(eyes.plan, eyes.slope)
+    near = (high[leaf, 1] > least[floor] + band[0]) & (low[leaf, 1] < greatest[floor] + band[1])
     leaf, floor = leaf[near], floor[near]
     edges = [body.points[body.edges] for body in bodies]
-    number = np.array([len(each) for each in edges], dtype=np.int64)
+    number = np.array([len(segments) for segments in edges], dtype=np.int64)
     for first in range(0, len(leaf), _AT_ONCE):
         some = np.arange(first, min(first + _AT_ONCE, len(leaf)))
         some = some[~result[leaf[some]]]
@@ -255,7 +467,7 @@ def meets(
             continue
         pair = np.repeat(np.arange(len(some)), number[leaf[some]])
         edge = np.concatenate([edges[i] for i in leaf[some].tolist()])
-        height = above(edge, eyes.slope[floor[some]][pair])
+        height = heights_above(edge, eyes.slope[floor[some]][pair])
         names, shadow = shadows(edge[:, :, PLAN], height, band, pair)
         touches = shapely.intersects(shadow, eyes.plan[floor[some]][names])
         result[leaf[some][names[touches]]] = True

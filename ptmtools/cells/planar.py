@@ -32,7 +32,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.search import along_a_curve, connected, distinct, first_alike
+from ptmtools.cells.search import along_a_curve, connect, distinct, first_alike
 from ptmtools.tolerance import GRID_SHARE, ROUNDING_SHARE, Tolerance
 
 #: A shapely geometry, or an array of them.
@@ -79,7 +79,7 @@ def union(shapes: Geometry, grid: float, *, more: bool = False) -> Geometry:
     Snap rounding takes the square of the corners on one line, so large sets of polygons are united
     by neighbourhoods, each rid of corners on straight edges, and these in turn.
     """
-    polygons = _polygons_in(_rounded(shapes, grid))
+    polygons = _polygons_in(_round_to_grid(shapes, grid))
     before = 2 * len(polygons) + 1
     while _CHUNK < len(polygons) < before / 2:
         before = len(polygons)
@@ -88,11 +88,11 @@ def union(shapes: Geometry, grid: float, *, more: bool = False) -> Geometry:
         polygons = polygons[along_a_curve((boxes[:, :2] + boxes[:, 2:]) / 2)]
         chunks = np.array_split(polygons, -(-before // _CHUNK))
         united = np.array([_union(chunk, grid, more) for chunk in chunks])
-        polygons = _polygons_in(straightened(united, grid))
-    return straightened(_union(polygons, grid, more), grid)
+        polygons = _polygons_in(straighten(united, grid))
+    return straighten(_union(polygons, grid, more), grid)
 
 
-def united_by(
+def unite_rows(
     row: Ints, shapes: Geometry, grid: float, *, more: bool = False
 ) -> tuple[Ints, Geometry]:
     """(g,) the distinct rows, (n,), of shapes, ascending, and the union of the shapes of each,
@@ -109,18 +109,18 @@ def united_by(
     return names[some], united[some]
 
 
-def intersection(one: Geometry, other: Geometry, grid: float, *, more: bool = False) -> Geometry:
+def intersection(first: Geometry, second: Geometry, grid: float, *, more: bool = False) -> Geometry:
     """Pairwise intersection."""
 
-    def instead(one: Geometry, other: Geometry) -> Geometry:
-        return _common_box(one, other) if more else shapely.Polygon()
+    def instead(first: Geometry, second: Geometry) -> Geometry:
+        return _common_box(first, second) if more else shapely.Polygon()
 
-    return _polygonal(_overlay(shapely.intersection, one, other, grid, instead))
+    return _polygonal(_overlay(shapely.intersection, first, second, grid, instead))
 
 
-def difference(one: Geometry, other: Geometry, grid: float) -> Geometry:
-    """Pairwise difference, ``one`` less ``other``."""
-    return _polygonal(_overlay(shapely.difference, one, other, grid, lambda one, _: one))
+def difference(first: Geometry, second: Geometry, grid: float) -> Geometry:
+    """Pairwise difference, ``first`` less ``second``."""
+    return _polygonal(_overlay(shapely.difference, first, second, grid, lambda first, _: first))
 
 
 def buffer(
@@ -135,23 +135,23 @@ def buffer(
         wide = np.array([-1, -1, 1, 1]) * max(distance, 0.0)
         return shapely.box(*(shapely.bounds(shape) + wide)) if more else shape
 
-    def widened(shapes: Geometry) -> Geometry:
+    def widen(shapes: Geometry) -> Geometry:
         return shapely.buffer(shapes, distance, **style)
 
-    repaired = [lambda shape: widened(_repaired(shape))]
-    return _each("buffer", widened, (shapes,), repaired, instead)
+    repaired = [lambda shape: widen(_repair(shape))]
+    return _apply("buffer", widen, (shapes,), repaired, instead)
 
 
-def straightened(shapes: Geometry, grid: float) -> Geometry:
+def straighten(shapes: Geometry, grid: float) -> Geometry:
     """Shapes without corners on straight edges, except where a polygon would then cross itself."""
-    simple = simplified(shapes, grid)
+    simple = simplify(shapes, grid)
     return np.asarray(np.where(shapely.is_valid(simple), simple, shapes))[()]
 
 
-def simplified(shapes: Geometry, distance: float) -> Geometry:
+def simplify(shapes: Geometry, distance: float) -> Geometry:
     """`shapely.simplify`; a shape at which GEOS gives up stays as it is."""
-    return _each(
-        "", lambda shapes: shapely.simplify(shapes, distance), (shapes,), [], lambda one: one
+    return _apply(
+        "", lambda shapes: shapely.simplify(shapes, distance), (shapes,), [], lambda shape: shape
     )
 
 
@@ -159,10 +159,10 @@ def neighbours(polygons: Geometry, gap: float) -> Ints:
     """(n,) the group of each of n polygons: those less than ``gap`` apart are in one, so that a
     T-junction whose edge misses the corner by a rounding still joins."""
     pairs = shapely.STRtree(polygons).query(polygons, predicate="dwithin", distance=gap)
-    return connected(len(polygons), pairs.T)
+    return connect(len(polygons), pairs.T)
 
 
-def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geometry:
+def open_part(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geometry:
     """The unblocked part of a region without cracks narrower than a hairline: a crack under a wall
     would stretch the hull of a door along all of it.
 
@@ -176,38 +176,38 @@ def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geo
     return intersection(opening, grown, grid, more=True)
 
 
-def bounded(segments: Floats, of: Ints) -> Geometry:
-    """The areas that (n, 2, 2) segments bound, one for each run of equal numbers in (n,) ``of``,
+def build_areas(segments: Floats, owner: Ints) -> Geometry:
+    """The areas that (n, 2, 2) segments bound, one for each run of equal numbers in (n,) ``owner``,
     ascending; empty where GEOS recognises none."""
-    lines = shapely.multilinestrings(shapely.linestrings(segments), indices=of)
-    return _each("triangles", shapely.build_area, (lines,), [], lambda _: shapely.Polygon())
+    lines = shapely.multilinestrings(shapely.linestrings(segments), indices=owner)
+    return _apply("triangles", shapely.build_area, (lines,), [], lambda _: shapely.Polygon())
 
 
-def divided(shapes: Geometry) -> tuple[Floats, Ints]:
+def triangulate_polygons(shapes: Geometry) -> tuple[Floats, Ints]:
     """(m, 3, 2) triangles of an array of polygons, and (m,) the polygon of each, ascending: the
     constrained Delaunay triangulation, whose corners are those of the polygon to the last bit.
     Polygons that GEOS cannot divide so, such as some with touching holes, are left out, counted."""
-    parts, of = shapely.get_parts(delaunay(shapes), return_index=True)
+    parts, polygon = shapely.get_parts(delaunay(shapes), return_index=True)
     triangle = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
     corner, owner = shapely.get_coordinates(shapes, return_index=True)
     rows = np.column_stack(
         [
-            np.append(owner, np.repeat(of, 3)).astype(np.float64),
+            np.append(owner, np.repeat(polygon, 3)).astype(np.float64),
             np.concatenate([corner, triangle.reshape(-1, 2)]),
         ]
     )
     first, row = distinct(rows)
     fresh = first[row[len(corner) :]] >= len(corner)
-    kept = ~np.isin(of, np.repeat(of, 3)[fresh])
-    whole = np.isin(np.arange(len(shapes)), of[kept]) | shapely.is_empty(shapes)
+    kept = ~np.isin(polygon, np.repeat(polygon, 3)[fresh])
+    whole = np.isin(np.arange(len(shapes)), polygon[kept]) | shapely.is_empty(shapes)
     count(["triangles"] * np.count_nonzero(~whole))
-    return triangle[kept], of[kept]
+    return triangle[kept], polygon[kept]
 
 
 def delaunay(shapes: Geometry) -> Geometry:
     """The constrained Delaunay triangulations of an array of polygons, which may have corners of
     their own where holes touch; empty for those at which GEOS gives up, which are not counted."""
-    return _each(
+    return _apply(
         "",
         shapely.constrained_delaunay_triangles,
         (shapes,),
@@ -218,26 +218,26 @@ def delaunay(shapes: Geometry) -> Geometry:
 
 def _overlay(
     operation: Callable[..., Geometry],
-    one: Geometry,
-    other: Geometry,
+    first: Geometry,
+    second: Geometry,
     grid: float,
     instead: Callable[[Geometry, Geometry], Geometry],
 ) -> Geometry:
     """An operation on a grid, pair by pair; see the module's head."""
-    one, other = np.broadcast_arrays(np.asarray(one, object), np.asarray(other, object))
+    first, second = np.broadcast_arrays(np.asarray(first, object), np.asarray(second, object))
 
-    def on(step: float) -> Callable[[Geometry, Geometry], Geometry]:
-        return lambda one, other: operation(one, other, grid_size=step)
+    def snap_to(step: float) -> Callable[[Geometry, Geometry], Geometry]:
+        return lambda first, second: operation(first, second, grid_size=step)
 
-    def again(times: float, *, repair: bool) -> Callable[[Geometry, Geometry], Geometry]:
-        def attempt(one: Geometry, other: Geometry) -> Geometry:
-            both = [_repaired(shape) if repair else shape for shape in (one, other)]
+    def retry(times: float, *, repair: bool) -> Callable[[Geometry, Geometry], Geometry]:
+        def attempt(first: Geometry, second: Geometry) -> Geometry:
+            both = [_repair(shape) if repair else shape for shape in (first, second)]
             return operation(*both, grid_size=times * _step(grid, both))
 
         return attempt
 
-    attempts = [again(times, repair=fix) for fix in (False, True) for times in _COARSER]
-    return _each(operation.__name__, on(grid), (one, other), attempts, instead)
+    attempts = [retry(times, repair=fix) for fix in (False, True) for times in _COARSER]
+    return _apply(operation.__name__, snap_to(grid), (first, second), attempts, instead)
 
 
 def _union(polygons: Geometry, grid: float, more: bool) -> Geometry:
@@ -254,15 +254,15 @@ def _union(polygons: Geometry, grid: float, more: bool) -> Geometry:
         parts = [_union(some, grid, more) for some in (polygons[:half], polygons[half:])]
         return _union(_polygonal(np.array(parts)), grid, more)
 
-    def instead(one: Geometry, other: Geometry) -> Geometry:
+    def instead(first: Geometry, second: Geometry) -> Geometry:
         if more:
-            return shapely.box(*shapely.total_bounds([one, other]))
-        return max(one, other, key=shapely.area)
+            return shapely.box(*shapely.total_bounds([first, second]))
+        return max(first, second, key=shapely.area)
 
     return _polygonal(_overlay(shapely.union, polygons[0], polygons[-1], grid, instead))
 
 
-def _each(
+def _apply(
     name: str,
     operation: Callable[..., Geometry],
     operands: Sequence[Geometry],
@@ -276,12 +276,14 @@ def _each(
         return operation(*operands)
     except shapely.GEOSException:
         pass
-    operands = [np.asarray(each, object) for each in operands]
+    operands = [np.asarray(operand, object) for operand in operands]
     if (size := operands[0].size) > 1:
         half = size // 2
-        sides = ([each[part] for each in operands] for part in (slice(half), slice(half, None)))
-        return np.concatenate([_each(name, operation, side, again, instead) for side in sides])
-    single = [each.reshape(-1)[0] for each in operands]
+        sides = (
+            [operand[part] for operand in operands] for part in (slice(half), slice(half, None))
+        )
+        return np.concatenate([_apply(name, operation, side, again, instead) for side in sides])
+    single = [operand.reshape(-1)[0] for operand in operands]
     for attempt in again:
         with suppress(shapely.GEOSException):
             value = attempt(*single)
@@ -300,30 +302,30 @@ def _step(grid: float, shapes: Geometry) -> float:
     return max(grid, _DIGITS * float(np.spacing(largest)))
 
 
-def _rounded(shapes: Geometry, grid: float) -> Geometry:
+def _round_to_grid(shapes: Geometry, grid: float) -> Geometry:
     """Polygons with their corners on a grid, where GEOS can; empty if they have no area there."""
-    return _each(
+    return _apply(
         "",
         lambda shapes: shapely.set_precision(shapes, grid),
         (shapes,),
-        [lambda one: shapely.set_precision(one, _step(grid, one)), _repaired],
-        lambda one: one,
+        [lambda shape: shapely.set_precision(shape, _step(grid, shape)), _repair],
+        lambda shape: shape,
     )
 
 
 def _sound(shapes: Geometry) -> Geometry:
     """Polygons without crossings of their own outlines, where GEOS can."""
-    return _each("", shapely.make_valid, (shapes,), [], lambda one: one)
+    return _apply("", shapely.make_valid, (shapes,), [], lambda shape: shape)
 
 
-def _repaired(shape: Geometry) -> Geometry:
+def _repair(shape: Geometry) -> Geometry:
     """The polygons of a shape without crossings of its own outlines."""
     return _polygonal(shapely.make_valid(shape))
 
 
-def _common_box(one: Geometry, other: Geometry) -> Geometry:
+def _common_box(first: Geometry, second: Geometry) -> Geometry:
     """The intersection of the boxes around two shapes."""
-    a, b = shapely.bounds(one), shapely.bounds(other)
+    a, b = shapely.bounds(first), shapely.bounds(second)
     low, high = np.maximum(a[:2], b[:2]), np.minimum(a[2:], b[2:])
     return shapely.box(*low, *high) if (low < high).all() else shapely.Polygon()
 
@@ -345,7 +347,7 @@ def _polygonal(shapes: Geometry) -> Geometry:
     return every if np.ndim(shapes) else every[0]
 
 
-def triangulated(corner: Floats, start: Ints, polygon: Ints) -> tuple[Ints, Ints]:
+def triangulate_rings(corner: Floats, start: Ints, polygon: Ints) -> tuple[Ints, Ints]:
     """Triangles of polygons that are given as rings: the outer one, counter-clockwise, then holes.
 
     ``corner``: (n, 2) corners of all rings; ``start``: (r + 1,) CSR of the rings; ``polygon``: (r,)
@@ -361,22 +363,23 @@ def triangulated(corner: Floats, start: Ints, polygon: Ints) -> tuple[Ints, Ints
     owner = np.repeat(polygon, size)
     ready = (corners == 3)[owner]
     rows, others = np.flatnonzero(ready), np.flatnonzero(~ready)
-    index, of = _delaunay(corner[others], np.repeat(np.arange(len(size)), size)[others], polygon)
+    ring = np.repeat(np.arange(len(size)), size)
+    index, parent = _delaunay(corner[others], ring[others], polygon)
     # A corner in which two rings touch is one corner; the joint takes the place of a bridge.
     same = first_alike(np.column_stack([owner[others], corner[others]]))
     index = same[index]
     touching = np.bincount(owner[others][same != np.arange(len(same))], minlength=count)
     triangle = np.concatenate([rows.reshape(-1, 3), others[index]])
-    of = np.concatenate([owner[rows[::3]], of])
+    parent = np.concatenate([owner[rows[::3]], parent])
     a, b, c = corner[triangle].transpose(1, 0, 2)
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
     twice = ux * vy - uy * vx
     triangle[twice < 0] = triangle[twice < 0, ::-1]
-    sound = np.bincount(of, minlength=count) == corners + 2 * rings - 4 - 2 * touching
-    sound[of[twice == 0]] = False
-    kept = np.flatnonzero(sound[of])
-    kept = kept[np.argsort(of[kept], kind="stable")]
-    return triangle[kept], of[kept]
+    sound = np.bincount(parent, minlength=count) == corners + 2 * rings - 4 - 2 * touching
+    sound[parent[twice == 0]] = False
+    kept = np.flatnonzero(sound[parent])
+    kept = kept[np.argsort(parent[kept], kind="stable")]
+    return triangle[kept], parent[kept]
 
 
 def _delaunay(corner: Floats, ring: Ints, polygon: Ints) -> tuple[Ints, Ints]:
@@ -389,9 +392,9 @@ def _delaunay(corner: Floats, ring: Ints, polygon: Ints) -> tuple[Ints, Ints]:
     rings = shapely.linearrings(corner, indices=ring)  # it closes them
     shapes = shapely.polygons(rings, indices=place)
     sound = np.flatnonzero(shapely.is_valid(shapes))
-    triangles, of = divided(shapes[sound])
-    points, of = triangles.reshape(-1, 2), sound[of]
+    triangles, parent = triangulate_polygons(shapes[sound])
+    points, parent = triangles.reshape(-1, 2), sound[parent]
     # The corner of its polygon that each point equals, to the last bit.
-    shape = np.concatenate([place[ring], np.repeat(of, 3)])
+    shape = np.concatenate([place[ring], np.repeat(parent, 3)])
     same = first_alike(np.column_stack([shape, np.concatenate([corner, points])]))
-    return same[len(corner) :].reshape(-1, 3), owner[of]
+    return same[len(corner) :].reshape(-1, 3), owner[parent]

@@ -33,10 +33,10 @@ from ptmtools.cells.planar import (
     delaunay,
     difference,
     intersection,
-    left_open,
+    open_part,
     union,
 )
-from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
+from ptmtools.cells.planes import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import Structure, Surroundings
 from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
@@ -162,10 +162,10 @@ def _openings(
     every = union(shared, tolerance.grid, more=True)
     if wall.barring is None and shapely.covered_by(every, wall.blocking):
         return
-    opening = left_open(every, wall.blocking, tolerance)
+    opening = open_part(every, wall.blocking, tolerance)
     openings = [(opening, False)]
     if wall.barring is not None:
-        way = left_open(every, wall.barring, tolerance)
+        way = open_part(every, wall.barring, tolerance)
         openings.append((difference(way, opening, tolerance.grid), True))
     for shape, passage in openings:
         if shapely.is_empty(shape):
@@ -240,7 +240,7 @@ def largest_leaf(
     outwards = bool(order) and _outwards(corners)
     if outwards:
         around = Surroundings(corners, structure.tolerance)
-        floored = around.floored(np.array(list(middle.values())))
+        floored = around.have_floor(np.array(list(middle.values())))
         hollow = (leaf for leaf in compress(order, floored) if not around.solid(middle[leaf][None]))
     for leaves, solid in ((hollow, False), (order, outwards)):
         for leaf in leaves:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Ints, sum_by_group
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.scene.model import Scene
 
 #: Words for a door, in lower case.
@@ -54,10 +54,10 @@ class Designated:
     door: Bools  # (T,)
 
     @staticmethod
-    def of(scene: Scene, options: SubdivideOptions) -> Designated:
+    def from_options(scene: Scene, options: SubdivideOptions) -> Designated:
         """The roles that the options name, and otherwise those of the objects' classes."""
         forced, detail, door = (
-            named(scene, patterns)
+            triangles_matching(scene, patterns)
             for patterns in (options.structural, options.detail, options.door)
         )
         structural = forced
@@ -70,7 +70,7 @@ class Designated:
         return Designated(forced, structural, detail & ~structural, door & ~structural)
 
 
-def named(scene: Scene, patterns: Sequence[str]) -> Bools:
+def triangles_matching(scene: Scene, patterns: Sequence[str]) -> Bools:
     """(T,) which triangles have an object or a material whose name matches a pattern."""
     return triangles_named(scene, lambda name: matches(name, patterns))
 
@@ -142,5 +142,5 @@ def detail_by_shape(facets: Facets, object_of: NDArray[np.integer], wall_area: f
 
 def connected_pieces(mesh: Welded) -> Ints:
     """(n,) the connected piece of each triangle; pieces share no corners."""
-    point = connected(len(mesh.point), mesh.triangle)
+    point = connect(len(mesh.point), mesh.triangle)
     return np.unique(point[mesh.triangle[:, 0]], return_inverse=True)[1].reshape(-1)

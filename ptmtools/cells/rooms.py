@@ -8,7 +8,7 @@ opening between two regions is the largest group of touching portals, by true ar
 standing leaves join the rooms around them leaf by leaf, through the largest opening first; the
 inside of a door leaf, behind passages, comes last. Openings in the ceiling join no regions.
 
-**Named rooms.** Where the model has volumes of rooms (`room_volumes`), leaves in one volume grow
+**Named rooms.** Where the model has volumes of rooms (`named_rooms`), leaves in one volume grow
 together first, through openings of at least `OPEN_WITHIN` of the cross-section or larger than a
 double door: the model says that a bay belongs to its room, and that a hall goes on behind a core of
 lifts, but a door within a flat still divides. Regions in two volumes never join. Leaves in no
@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.cells.groups import DIGITS, Groups, gain_of, join_by_gain
 from ptmtools.cells.model import Cells
+from ptmtools.cells.named_rooms import Volumes, name_cells, unused_notes
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry
-from ptmtools.cells.room_volumes import Volumes, name_cells, unused_notes
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.cells.sight import from_places, portals_of, sampled_sight
 from ptmtools.diagnostics import Warned
 from ptmtools.tolerance import TIE_SHARE
@@ -126,19 +126,19 @@ def room_of_leaf(cells: Cells, rank: Ints, volume: Ints) -> Ints:
     """
     regions = _Regions(cells, rank, volume)
     openings = regions.openings()
-    regions.grown_within()
-    room = regions.grown(lambda closed: -closed >= OPEN)
+    regions.grow_within()
+    room = regions.grow(lambda closed: -closed >= OPEN)
     standing = np.zeros(cells.leaf_count, dtype=np.bool_)
     standing[room[rank[cells.leaf_standing]]] = True
     return _with_space_above(cells, _adopt(room, standing[room], openings)[rank])
 
 
-def of_one_room(cells: Cells, volume: Ints) -> Ints:
+def volumes_of_one_room(cells: Cells, volume: Ints) -> Ints:
     """(L,) the volume that each leaf is in, -1 for none and for volumes of several rooms."""
     if volume.max(initial=-1) < 0:
         return volume
     rank = rank_in_file(cells)
-    region = _Regions(cells, rank, volume).grown_within()[rank]
+    region = _Regions(cells, rank, volume).grow_within()[rank]
     size = cells.leaf_volumes() * cells.leaf_standing
     several = []
     for name in range(int(volume.max()) + 1):
@@ -158,7 +158,7 @@ def _with_space_above(cells: Cells, room: Ints) -> Ints:
     middle = np.add.reduceat(cells.leaf_point[:, 1], start) / np.diff(cells.leaf_point_start)
     above = middle > cells.ceiling
     joins = above[cells.portal_leaf].all(axis=1)
-    space = connected(cells.leaf_count, cells.portal_leaf[joins])
+    space = connect(cells.leaf_count, cells.portal_leaf[joins])
     upper, lower = np.where(above[ends], ends, ends[:, ::-1]).T
     result = room.copy()
     for name in np.unique(space[upper]):
@@ -212,16 +212,16 @@ class _Regions(Groups):
         self._opening: dict[tuple[int, int], float] = {}
         self._within = volume[order].tolist()
 
-    def grown_within(self) -> Ints:
+    def grow_within(self) -> Ints:
         """(L,) the groups, once those in one volume are joined."""
         if max(self._within, default=-1) < 0:
             return self._parent
         self._only_within = True
-        result = self.grown(lambda closed: -closed >= OPEN_WITHIN)
+        result = self.grow(lambda closed: -closed >= OPEN_WITHIN)
         self._only_within = False
         return result
 
-    def _apart(self, a: int, b: int) -> bool:
+    def _keep_apart(self, a: int, b: int) -> bool:
         """Whether the volumes that two regions are in keep them apart."""
         first, second = self._within[a], self._within[b]
         return bool(first != second and (self._only_within or min(first, second) >= 0))
@@ -236,7 +236,7 @@ class _Regions(Groups):
 
     def cost(self, a: int, b: int) -> float:
         """Less the opening between them, as a share of the narrower one's cross-section."""
-        if self._apart(a, b):
+        if self._keep_apart(a, b):
             return np.inf
         if (a, b) not in self._opening:
             self._opening[a, b] = self._largest_opening(self.near[a][b])
@@ -330,15 +330,15 @@ def _distance(points: Floats, polygon: Floats) -> Floats:
 ONE_HALL = Warned("visibility culling saves nothing here: the model is a single hall")
 
 
-def grouped(cells: Cells, options: SubdivideOptions, volumes: Volumes | None = None) -> Cells:
+def group_cells(cells: Cells, options: SubdivideOptions, volumes: Volumes | None = None) -> Cells:
     """Groups cells that are single leaves by the options, and names those in ``volumes``.
 
     Cells are numbered in the order of their first leaves; geometry in a boundary between two
     leaves of one cell lies inside that cell.
     """
     leaf, volumes = leaf_of_cell(cells), volumes or Volumes()
-    volume = volumes.of_leaves(cells)
-    kept = of_one_room(cells, volume)
+    volume = volumes.assign_leaves(cells)
+    kept = volumes_of_one_room(cells, volume)
     cells = replace(cells, notes=(*cells.notes, *unused_notes(volumes, volume, kept)))
     room, group = kept, np.arange(cells.leaf_count)
     if options.cells == "room":

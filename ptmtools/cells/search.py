@@ -55,7 +55,7 @@ def first_alike(rows: NDArray[np.float64] | NDArray[np.int64]) -> Ints:
     return first[row]
 
 
-def welded(points: Floats, reach: float) -> Ints:
+def weld(points: Floats, reach: float) -> Ints:
     """(n,) the first of the (n, 3) points that chains of steps up to ``reach`` join to each."""
     first = first_alike(points)
     one_each = np.flatnonzero(first == np.arange(len(first)))
@@ -71,13 +71,13 @@ def welded(points: Floats, reach: float) -> Ints:
         apart = np.subtract(*points[one_each[pair]])
         pairs.append(pair[:, np.einsum("ij,ij->i", apart, apart) <= reach**2])
         step += 1
-    group = connected(len(one_each), np.concatenate(pairs, axis=1).T)
+    group = connect(len(one_each), np.concatenate(pairs, axis=1).T)
     to = np.arange(len(points))
     to[one_each] = one_each[group]
     return to[first]
 
 
-def connected(count: int, rows: NDArray[np.integer]) -> Ints:
+def connect(count: int, rows: NDArray[np.integer]) -> Ints:
     """(count,) the least index to which rows, (n, k), such as pairs of neighbours or the corners of
     triangles, connect each index below ``count``."""
     from ptmtools.cells.kernels import connect_rows
@@ -108,7 +108,7 @@ class Nearby:
             low = high = np.zeros((0, 3))
         self._middle, self._half = (low + high) / 2, (high - low) / 2
 
-    def between(self, plane: Floats, low: float, high: float) -> Ints:
+    def find_between(self, plane: Floats, low: float, high: float) -> Ints:
         """Triangles, ascending, among which are all with a point whose distance from the (4,)
         plane, along its normal, is in [low, high]."""
         distance = self._middle @ plane[:3] + plane[3]
@@ -147,7 +147,7 @@ class ByHeight:
         self._sizes, start = np.unique(size[order], return_index=True)
         self._groups = np.split(order, start[1:]) if len(start) else []
 
-    def between(self, lowest: float, highest: float) -> Ints:
+    def find_between(self, lowest: float, highest: float) -> Ints:
         """The spans, ascending, that meet the range between two heights, metres."""
         rows = [np.zeros(0, dtype=np.int64)]
         for size, group in zip(self._sizes.tolist(), self._groups, strict=True):

@@ -20,11 +20,11 @@ from ptmtools.cells.building import Building
 from ptmtools.cells.doors import THICK, open_doors
 from ptmtools.cells.floors import ceiling_plane
 from ptmtools.cells.model import descend
+from ptmtools.cells.named_rooms import split_at
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.places import spread
 from ptmtools.cells.planar import counting
-from ptmtools.cells.planes import bounds
-from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.planes import Polyhedron, bounds
 from ptmtools.cells.portals import (
     Portal,
     at_box,
@@ -34,8 +34,7 @@ from ptmtools.cells.portals import (
     rejoin_caps,
     update_portals,
 )
-from ptmtools.cells.room_planes import split_at
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
@@ -58,7 +57,7 @@ class UnreachedRoom:
     eye: tuple[float, float, float]  # a viewpoint in it, metres
 
     @staticmethod
-    def of(leaves: Ints, standing: Standing) -> UnreachedRoom:
+    def from_bodies(leaves: Ints, standing: Standing) -> UnreachedRoom:
         """The room of (n,) leaves and the bodies that stand in them."""
         points = standing.points
         away = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
@@ -75,14 +74,14 @@ class Standing:
     leaf: Ints  # (n,) the leaf of each
 
     @staticmethod
-    def of(tree: Tree, leaves: Bools, building: Building) -> Standing:
+    def from_tree(tree: Tree, leaves: Bools, building: Building) -> Standing:
         """Bodies in these (L,) leaves."""
         points, place = spread(_floor_about(tree, leaves, building))
         points = points + [0.0, building.walker.middle, 0.0]
-        inside, leaf = _within(tree, leaves, points)
+        inside, leaf = _locate_within(tree, leaves, points)
         return Standing(points, place, leaf).only(inside)
 
-    def joined(self, bodies: Standing) -> Standing:
+    def append(self, bodies: Standing) -> Standing:
         """These bodies, then the others."""
         pairs = zip(vars(self).values(), vars(bodies).values(), strict=True)
         return Standing(*map(np.concatenate, pairs))
@@ -99,7 +98,7 @@ class Unreached:
     rooms: list[UnreachedRoom]  # the largest first
     outside: UnreachedRoom | None = None  # in a building, but outside the closed model
 
-    def without(self, reached: Bools, portals: list[Portal]) -> Unreached:
+    def remove_reached(self, reached: Bools, portals: list[Portal]) -> Unreached:
         """The rest once the flood reaches the (L,) leaves ``reached`` through more ``portals``;
         rooms that these connect are one."""
         group = groups(len(reached), portals)
@@ -115,7 +114,7 @@ class Unreached:
         ]
         return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
 
-    def added_to(self, reached: Bools) -> Bools:
+    def add_to(self, reached: Bools) -> Bools:
         """(L,) the ``reached`` leaves, (L,), and those of unreachable rooms."""
         result = reached.copy()
         for room in self.rooms:
@@ -123,7 +122,7 @@ class Unreached:
         return result
 
 
-def unreached(
+def find_unreached(
     tree: Tree, portals: list[Portal], reached: Bools, outer: Bools, building: Building
 ) -> Unreached:
     """Walkable space outside the (L,) ``reached`` leaves; groups with one of the (L,) ``outer``
@@ -133,16 +132,16 @@ def unreached(
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
     if not ((waiting | outside).any() and len(structure.corners)):
         return Unreached([])
-    standing = Standing.of(tree, waiting, building)
+    standing = Standing.from_tree(tree, waiting, building)
     around = Surroundings(structure.corners, structure.tolerance)
     # Apart, since the ground may be so large that few samples on it are in a building.
-    sheltered = Standing.of(tree, outside & ~outer, building)
-    sheltered = sheltered.joined(Standing.of(tree, outside & outer, building))
+    sheltered = Standing.from_tree(tree, outside & ~outer, building)
+    sheltered = sheltered.append(Standing.from_tree(tree, outside & outer, building))
     if len(sheltered.leaf):
-        sheltered = sheltered.only(building.with_glass().inside(sheltered.points))
+        sheltered = sheltered.only(building.with_glass().enclose(sheltered.points))
     outside_room = None
     if sheltered.place.sum() >= LEAST_INSIDE:
-        outside_room = UnreachedRoom.of(np.unique(sheltered.leaf), sheltered)
+        outside_room = UnreachedRoom.from_bodies(np.unique(sheltered.leaf), sheltered)
     # In a model whose room faces point outwards, solids cannot be recognised.
     volumes = np.array([body.volume for body in tree.leaves]) * reached
     middles = np.array([tree.leaves[i].points.mean(axis=0) for i in rank(volumes)[:LOOKS]])
@@ -150,13 +149,13 @@ def unreached(
     rooms = []
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
         points = spread_over(room.points, _CHOICE)
-        indoors = points[around.inside(points)]  # outside, walls without a back face away
+        indoors = points[around.enclose(points)]  # outside, walls without a back face away
         points = spread_over(indoors if len(indoors) else points, LOOKS)
         leaves = np.flatnonzero(group == group[room.leaf[0]])
         # The inside of a shut door leaf is no room.
         thin = max(tree.leaves[leaf].width for leaf in leaves) <= THICK + structure.tolerance.plane
         if not (thin or (recognisable and around.solid(points))):
-            rooms.append(UnreachedRoom.of(leaves, room))
+            rooms.append(UnreachedRoom.from_bodies(leaves, room))
     return Unreached(rooms, outside_room)
 
 
@@ -170,9 +169,9 @@ def floor_of(
         leaves[room.leaves] = True
     floor = _floor_about(tree, leaves, building)
     middle = floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
-    kept, leaf = _within(tree, leaves, middle)
+    kept, leaf = _locate_within(tree, leaves, middle)
     if outside:
-        kept &= ~np.isin(leaf, outside.leaves) | building.with_glass().inside(middle)
+        kept &= ~np.isin(leaf, outside.leaves) | building.with_glass().enclose(middle)
     return floor[kept]
 
 
@@ -180,11 +179,11 @@ def _floor_about(tree: Tree, leaves: Bools, building: Building) -> Floats:
     """(n, 3, 3) walkable triangles of floor, those about (L,) leaves among them."""
     boxes = np.array([bounds(tree.leaves[leaf].points) for leaf in np.flatnonzero(leaves)])
     places, middle = building.places, building.walker.middle
-    near = places.near(boxes.reshape(-1, 2, 3) - [0, middle, 0])
+    near = places.find_near(boxes.reshape(-1, 2, 3) - [0, middle, 0])
     return places.only(near & places.front).triangles(building.structure.tolerance)
 
 
-def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
+def _locate_within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
     """(n,) whether each of (n, 3) points is in one of the (L,) leaves, and (n,) its leaf."""
     low, high = bounds(np.concatenate([body.points for body in tree.leaves]))
     leaf = np.asarray(-2 - descend(tree.planes, tree.children, points))
@@ -204,11 +203,11 @@ def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
 def groups(leaves: int, portals: list[Portal]) -> Ints:
     """(leaves,) the least leaf to which portals connect each."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
-    return connected(leaves, ends)
+    return connect(leaves, ends)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Space:
+class DividedSpace:
     """A divided root box; ``box``: (2, 3) its bounding box."""
 
     box: Floats
@@ -227,14 +226,14 @@ class Space:
     undecided: Counter[str] = field(default_factory=Counter)
 
 
-def divide_inside(building: Building, box: Floats) -> Space:
+def divide_inside(building: Building, box: Floats) -> DividedSpace:
     """Subdivide the box between two corners, (2, 3); leaves at its sides count as inside."""
     return divide(building, Polyhedron.box(*box), inside=True)
 
 
 def divide(
     building: Building, root: Polyhedron, progress: Progress = silent, inside: bool = False
-) -> Space:
+) -> DividedSpace:
     """Subdivide a root box and flood it.
 
     Raises
@@ -246,7 +245,7 @@ def divide(
     return replace(space, undecided=undecided)
 
 
-def _divide(building: Building, root: Polyhedron, progress: Progress, inside: bool) -> Space:
+def _divide(building: Building, root: Polyhedron, progress: Progress, inside: bool) -> DividedSpace:
     structure, options = building.structure, building.options
     box, top, ceiling = np.stack(bounds(root.points)), building.ceiling, None
     if inside and top is not None:
@@ -271,7 +270,7 @@ def _divide(building: Building, root: Polyhedron, progress: Progress, inside: bo
     if closed and solid and not inside and _stands_elsewhere(tree, reached, building):
         closed, reached = False, np.zeros_like(reached)
     shut = np.zeros(len(building.doors.leaves), dtype=bool)
-    space = Space(
+    space = DividedSpace(
         box=box,
         tree=tree,
         portals=portals,
@@ -295,20 +294,22 @@ def _stands_elsewhere(tree: Tree, reached: Bools, building: Building) -> bool:
     """Whether more floor is walkable between walls elsewhere than in the (L,) leaves ``reached``,
     which may be the inside of a pillar."""
     structure = building.structure
-    there = Standing.of(tree, ~reached, building)
-    walled = Surroundings(structure.corners, structure.tolerance).inside(there.points, roofed=False)
-    reached_place = float(Standing.of(tree, reached, building).place.sum())
+    there = Standing.from_tree(tree, ~reached, building)
+    walled = Surroundings(structure.corners, structure.tolerance).enclose(
+        there.points, roofed=False
+    )
+    reached_place = float(Standing.from_tree(tree, reached, building).place.sum())
     return float(there.place[walled].sum()) > reached_place
 
 
-def _complete(building: Building, space: Space, outer: Bools) -> Space:
+def _complete(building: Building, space: DividedSpace, outer: Bools) -> DividedSpace:
     """The space with its doors open and its unreachable rooms. ``outer``: (L,) the leaves at the
     box around a closed model, which proves to be open if a door leads into open rooms."""
     structure, options = building.structure, building.options
     tree, portals, reached, doors = space.tree, space.portals, space.reached, space.doors
-    beyond = unreached(tree, portals, reached, outer, building)
+    beyond = find_unreached(tree, portals, reached, outer, building)
     if options.doors != "closed":
-        within = beyond.added_to(reached)
+        within = beyond.add_to(reached)
         outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
         if building.doors.lead_to_open_rooms(structure, tree, within, outside):
             return replace(space, closed=False)
@@ -318,19 +319,19 @@ def _complete(building: Building, space: Space, outer: Bools) -> Space:
             doors, tree, portals = opened
             seeds = tuple(np.flatnonzero(reached).tolist())
             reached = flood(len(tree.leaves), portals, seeds)
-            beyond = beyond.without(reached, portals)
+            beyond = beyond.remove_reached(reached, portals)
     if options.reach == "all":
-        reached = beyond.added_to(reached)
+        reached = beyond.add_to(reached)
     space = replace(space, tree=tree, portals=portals, reached=reached, doors=doors, beyond=beyond)
     rooms = [] if options.reach == "all" else beyond.rooms
     if (rooms or beyond.outside) and reached.any():
         left_out = floor_of(rooms, beyond.outside, tree, building)
-        place = float(Standing.of(tree, reached, building).place.sum())
+        place = float(Standing.from_tree(tree, reached, building).place.sum())
         space = replace(space, left_out=left_out, place=place)
     return space
 
 
-def _rejoin_caps(space: Space, tolerance: Tolerance) -> Space:
+def _rejoin_caps(space: DividedSpace, tolerance: Tolerance) -> DividedSpace:
     """The space without the splits by caps and doors that separate nothing."""
     tree, portals = space.tree, space.portals
     if not tree.capped:

@@ -22,9 +22,16 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.planar import Geometry, left_open
-from ptmtools.cells.planes import Frame, bounds, parallel_gap, plane_axes
-from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron, section
+from ptmtools.cells.planar import Geometry, open_part
+from ptmtools.cells.planes import (
+    BOX_FACE,
+    PlaneFrame,
+    Polyhedron,
+    bounds,
+    parallel_gap,
+    plane_axes,
+    section,
+)
 from ptmtools.cells.search import Tries
 from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.tolerance import TIE_SHARE, rank
@@ -42,7 +49,7 @@ class Reveals:
     def __getstate__(self) -> dict[str, object]:
         return {**vars(self), "_known": {}}  # another thread may be adding to it
 
-    def within(self, body: Polyhedron, walls: list[WallPlane]) -> list[WallPlane]:
+    def select(self, body: Polyhedron, walls: list[WallPlane]) -> list[WallPlane]:
         """The reveals of the slab that a body lies in; none if it lies in no wall.
 
         ``walls`` are those of the BSP nodes that the tags of the body's faces name.
@@ -71,7 +78,9 @@ class Reveals:
         width = abs(float(first[3]) - turn * float(second[3]))
         inward = float(np.sign(float(first[3]) - turn * float(second[3]))) or 1.0
         structure, areas = self._structure, self._structure.areas
-        near = structure.nearby.between(first, *sorted((inward * slack, inward * (width - slack))))
+        near = structure.nearby.find_between(
+            first, *sorted((inward * slack, inward * (width - slack)))
+        )
         depth = inward * (structure.corners[near] @ first[:3] + first[3])
         low, high = depth.min(axis=1), depth.max(axis=1)
         within = (high > slack) & (low < width - slack) & (areas[near] > 0)
@@ -84,10 +93,10 @@ class Reveals:
             apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in result)
             if min(apart, default=self._limit) < self._tolerance.thin:
                 continue
-            frame, lies = Frame.of(plane), structure.lie_in(plane, inside)
+            frame, lies = PlaneFrame.from_plane(plane), structure.lie_in(plane, inside)
             walls, blocking = inside[lies & spans], inside[lies]
             result.append(
-                WallPlane(frame, structure.united(frame, walls), structure.united(frame, blocking))
+                WallPlane(frame, structure.unite(frame, walls), structure.unite(frame, blocking))
             )
         return result
 
@@ -97,11 +106,11 @@ class Reveals:
         slack = self._tolerance.hairline
         between = np.flatnonzero((low >= -slack) & (high <= width + slack))
         names, region = np.unique(self._structure.region[triangles[between]], return_inverse=True)
-        least, most = np.full(len(names), np.inf), np.full(len(names), -np.inf)
+        least, greatest = np.full(len(names), np.inf), np.full(len(names), -np.inf)
         np.minimum.at(least, region, low[between])
-        np.maximum.at(most, region, high[between])
+        np.maximum.at(greatest, region, high[between])
         spans = np.zeros(len(triangles), dtype=bool)
-        spans[between] = ((least <= slack) & (most >= width - slack))[region]
+        spans[between] = ((least <= slack) & (greatest >= width - slack))[region]
         return spans
 
 
@@ -125,29 +134,29 @@ class DoorPlanes:
     """The planes of door leaves, and the boxes, metres, of the triangles in them."""
 
     structure: Structure
-    planes: tuple[tuple[Frame, Geometry], ...]  # with the polygons of the leaf in each
+    planes: tuple[tuple[PlaneFrame, Geometry], ...]  # with the polygons of the leaf in each
     low: Floats  # (p, 3) and
     high: Floats  # (p, 3) least and greatest corner
 
     @staticmethod
-    def of(structure: Structure, leaf: Ints, across: Floats) -> DoorPlanes:
+    def from_structure(structure: Structure, leaf: Ints, across: Floats) -> DoorPlanes:
         """The planes of d leaves across their (d, 3) directions; ``leaf``: (T,) the leaf of each
         triangle of a structure, -1 for none."""
-        own = np.flatnonzero(leaf >= 0)
-        turn = np.einsum("ij,ij->i", structure.planes[own, :3], across[leaf[own]])
-        own = own[np.abs(turn) >= _SQUARE]
-        order = own[np.argsort(leaf[own], kind="stable")]
+        rows = np.flatnonzero(leaf >= 0)
+        turn = np.einsum("ij,ij->i", structure.planes[rows, :3], across[leaf[rows]])
+        rows = rows[np.abs(turn) >= _SQUARE]
+        order = rows[np.argsort(leaf[rows], kind="stable")]
         bounds = np.searchsorted(leaf[order], np.arange(len(across) + 1))
-        layers: list[tuple[Frame, Ints]] = []
+        layers: list[tuple[PlaneFrame, Ints]] = []
         for first, last in itertools.pairwise(bounds):
             layers += _planes(structure, order[first:last])
         boxes = [structure.corners[flat].reshape(-1, 3) for _, flat in layers]
         low = np.array([points.min(axis=0) for points in boxes]).reshape(-1, 3)
         high = np.array([points.max(axis=0) for points in boxes]).reshape(-1, 3)
-        planes = tuple((frame, structure.united(frame, flat)) for frame, flat in layers)
+        planes = tuple((frame, structure.unite(frame, flat)) for frame, flat in layers)
         return DoorPlanes(structure, planes, low, high)
 
-    def within(self, body: Polyhedron) -> list[WallPlane]:
+    def select(self, body: Polyhedron) -> list[WallPlane]:
         """The planes whose boxes meet that of a body, with what blocks there: all that lies in the
         plane of a leaf may be hundreds of leaves."""
         low, high = bounds(body.points)
@@ -156,21 +165,23 @@ class DoorPlanes:
         result = []
         for frame, walls in (self.planes[i] for i in meets):
             flat = near[self.structure.lie_in(frame.plane, near)]
-            result.append(WallPlane(frame, walls, self.structure.united(frame, flat)))
+            result.append(WallPlane(frame, walls, self.structure.unite(frame, flat)))
         return result
 
 
-def _planes(structure: Structure, triangles: Ints) -> list[tuple[Frame, Ints]]:
+def _planes(structure: Structure, triangles: Ints) -> list[tuple[PlaneFrame, Ints]]:
     """The planes of one leaf, and its ``triangles`` in each."""
     layers: list[tuple[float, Floats, Ints]] = []
-    left = triangles
-    while len(left):
-        plane = structure.planes[left[rank(structure.areas[left])[0]]]
-        flat = structure.lie_in(plane, left)
-        layers.append((float(structure.areas[left[flat]].sum()), plane, left[flat]))
-        left = left[~flat] if flat.any() else left[1:]
+    waiting = triangles
+    while len(waiting):
+        plane = structure.planes[waiting[rank(structure.areas[waiting])[0]]]
+        flat = structure.lie_in(plane, waiting)
+        layers.append((float(structure.areas[waiting[flat]].sum()), plane, waiting[flat]))
+        waiting = waiting[~flat] if flat.any() else waiting[1:]
     least = _SHARE * max((area for area, *_ in layers), default=0.0)
-    return [(Frame.of(plane), own) for area, plane, own in layers if area >= least]
+    return [
+        (PlaneFrame.from_plane(plane), members) for area, plane, members in layers if area >= least
+    ]
 
 
 #: Margin, as a share, of the comparison of areas that precedes that of polygons.
@@ -179,7 +190,7 @@ _SPARE = 1e-3
 _CHUNK = 4096
 
 
-def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
+def find_caps(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     """The planes whose polygons leave no opening between two parts of a body, in the order of the
     model's triangles: many are equally good, and areas of strips some centimetres wide keep few
     digits far from the origin."""
@@ -193,13 +204,13 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     nearby = structure.bins.own_sums(inside, areas)
     needed = _section_areas(body, planes) * (1 - _SPARE)
     free = needed <= nearby
-    own = structure.bins.own[inside]
+    home = structure.bins.own[inside]
     caps: list[tuple[int, WallPlane]] = []
-    tries = Tries(np.unique(own, return_inverse=True)[1].reshape(-1), areas)
+    tries = Tries(np.unique(home, return_inverse=True)[1].reshape(-1), areas)
     for seed in rank(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
         if not (free[seed] and tries.worth[seed]):
             continue
-        mates = np.flatnonzero(structure.bins.holds(own[seed], inside))
+        mates = np.flatnonzero(structure.bins.holds(home[seed], inside))
         members = mates[structure.lie_in(planes[seed], inside[mates])]
         free[members] = False
         free[seed] = False
@@ -208,7 +219,7 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
             caps += [(int(inside[members[0]]), cap)] if cap else []
         else:
             tries.fail(seed, mates[free[mates]], float(needed[seed]))
-    return [cap for _, cap in sorted(caps, key=lambda one: one[0])]
+    return [cap for _, cap in sorted(caps, key=lambda cap_with_seed: cap_with_seed[0])]
 
 
 def _reaching_into(body: Polyhedron, structure: Structure, triangles: Ints) -> Ints:
@@ -227,34 +238,34 @@ def _cap(body: Polyhedron, plane: Floats, structure: Structure, near: Ints) -> W
     outline = section(body, plane, tolerance.rounding)
     if len(outline) < 3:
         return None
-    frame = Frame.of(plane)
-    blocking = structure.united(frame, near[structure.lie_in(plane, near)])
-    opening = left_open(shapely.polygons(frame.to_plane(outline)), blocking, tolerance)
+    frame = PlaneFrame.from_plane(plane)
+    blocking = structure.unite(frame, near[structure.lie_in(plane, near)])
+    opening = open_part(shapely.polygons(frame.to_plane(outline)), blocking, tolerance)
     return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
 
 
 def _section_areas(body: Polyhedron, planes: Floats) -> Floats:
     """(n,) areas (m²) of a body's sections with (n, 4) planes, but for rounding; infinite where a
     plane does not cut it."""
-    one, other = body.edges.T
+    start, end = body.edges.T
     areas = np.full(len(planes), np.inf)
     for first in range(0, len(planes), _CHUNK):
         plane = planes[first : first + _CHUNK]
         height = plane[:, :3] @ body.points.T + plane[:, 3:]
-        crosses = (height[:, one] > 0) != (height[:, other] > 0)
+        crosses = (height[:, start] > 0) != (height[:, end] > 0)
         cut = np.flatnonzero(crosses.any(axis=1))
-        a, b, crosses = height[cut][:, one], height[cut][:, other], crosses[cut]
+        a, b, crosses = height[cut][:, start], height[cut][:, end], crosses[cut]
         t = np.divide(a, a - b, out=np.zeros(a.shape), where=crosses)[..., None]
-        points = body.points[one] * (1 - t) + body.points[other] * t
+        points = body.points[start] * (1 - t) + body.points[end] * t
         # An edge that is not cut repeats a corner, and adds nothing.
         corner = points[np.arange(len(cut)), crosses.argmax(axis=1)][:, None]
         points = np.where(crosses[..., None], points, corner) - corner
         centre = points.mean(axis=1, keepdims=True)
-        areas[first + cut] = _around(points - centre, plane[cut, :3])
+        areas[first + cut] = _polygon_areas(points - centre, plane[cut, :3])
     return areas
 
 
-def _around(points: Floats, normals: Floats) -> Floats:
+def _polygon_areas(points: Floats, normals: Floats) -> Floats:
     """(n,) areas of the convex polygons with corners (n, k, 3), in any order, about 0."""
     u, v = plane_axes(normals)
     x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)

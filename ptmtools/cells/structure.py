@@ -25,9 +25,9 @@ from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
 from ptmtools.cells.facets import Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
-from ptmtools.cells.planes import Frame, planes_of
+from ptmtools.cells.planes import PlaneFrame, planes_of
 from ptmtools.cells.roles import Designated, detail_by_shape
-from ptmtools.cells.search import Bins, Nearby, Tries, connected
+from ptmtools.cells.search import Bins, Nearby, Tries, connect
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
@@ -37,7 +37,7 @@ from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 class WallPlane:
     """A plane that may split cells, and the polygons in it, in its coordinates."""
 
-    frame: Frame
+    frame: PlaneFrame
     walls: Geometry  # the polygons that may split
     blocking: Geometry  # everything opaque and structural, which hides
     # What stops visitors: ``blocking`` without the leaves that they pass; None if it has none.
@@ -61,7 +61,7 @@ class Structure:
     door: Bools  # (T,) whether it belongs to a door leaf, which is no wall but may block
 
     @staticmethod
-    def of(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
+    def from_opaque(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
         """The structure of the opaque triangles, in the order of the file, flat regions of many in
         as few as their outlines need (`facets`); ``doors``: (T,) whether one of the scene's
         triangles belongs to a door leaf."""
@@ -70,9 +70,9 @@ class Structure:
         door = np.zeros(len(source), dtype=bool) if doors is None else doors[source]
         leaf, rest = np.flatnonzero(door & ~detail), np.flatnonzero(~door)
         if len(rest) < len(door):  # the edge of a leaf must not split the jamb that it touches
-            facets = Facets.of(Welded(mesh.point, mesh.triangle[rest], rest), file)
+            facets = Facets.from_mesh(Welded(mesh.point, mesh.triangle[rest], rest), file)
         parts = [
-            facets.fewer(~detail[rest] & (forced[rest] == value), file) for value in (False, True)
+            facets.reduce(~detail[rest] & (forced[rest] == value), file) for value in (False, True)
         ]
         first = np.concatenate([*(rest[rows] for _, rows in parts), leaf])
         order = np.argsort(first, kind="stable")
@@ -100,7 +100,7 @@ class Structure:
         lies: Bools = np.all(distance <= self.tolerance.plane, axis=1)
         return lies
 
-    def united(self, frame: Frame, triangles: Ints) -> Geometry:
+    def unite(self, frame: PlaneFrame, triangles: Ints) -> Geometry:
         """The union of these triangles in a plane."""
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
 
@@ -111,7 +111,7 @@ def structural_triangles(
     """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and no door
     leaves that are ``opened`` (see `Cells.opened`), unless these hide. The first of equal triangles
     may stand for all."""
-    opaque = Opaque.of(scene, options)
+    opaque = Opaque.from_scene(scene, options)
     result = np.zeros(len(scene.triangles), dtype=bool)
     result[opaque.source[~opaque.detail]] = True
     if opened is not None and options.doors != "pass":
@@ -129,12 +129,12 @@ class Opaque(NamedTuple):
     tolerance: Tolerance  # the scene's
 
     @staticmethod
-    def of(scene: Scene, options: SubdivideOptions) -> Opaque:
-        roles = Designated.of(scene, options)
+    def from_scene(scene: Scene, options: SubdivideOptions) -> Opaque:
+        roles = Designated.from_options(scene, options)
         candidates = np.flatnonzero(scene.opaque & ~roles.detail)
-        mesh = Welded.of(scene.points, scene.triangles[candidates])
+        mesh = Welded.from_triangles(scene.points, scene.triangles[candidates])
         source = candidates[mesh.source]
-        facets = Facets.of(mesh, scene.tolerance)
+        facets = Facets.from_mesh(mesh, scene.tolerance)
         detail = np.zeros(len(source), dtype=bool)
         if options.detail_by_shape:
             detail = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
@@ -148,27 +148,27 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     least = (1 - TIE_SHARE) * wall_area
     walls_by_area: list[tuple[float, WallPlane]] = []
     for plane in _layers(structure, least):
-        frame = Frame.of(plane)
-        near = structure.nearby.between(plane, -tolerance.plane, tolerance.plane)
+        frame = PlaneFrame.from_plane(plane)
+        near = structure.nearby.find_between(plane, -tolerance.plane, tolerance.plane)
         flat = near[structure.lie_in(plane, near)]
         if not _may_hold_wall(structure, frame, flat, least):
             continue
-        blocking = structure.united(frame, flat)
+        blocking = structure.unite(frame, flat)
         shapely.prepare(blocking)
         masonry = flat[~structure.door[flat]]
         alone = len(masonry) < len(flat)
-        parts = shapely.get_parts(structure.united(frame, masonry) if alone else blocking)
+        parts = shapely.get_parts(structure.unite(frame, masonry) if alone else blocking)
         group = neighbours(parts, tolerance.hairline)
         large = np.bincount(group, weights=shapely.area(parts))[group] >= least
         if np.any(forced[flat]):
-            large |= shapely.intersects(parts, structure.united(frame, flat[forced[flat]]))
+            large |= shapely.intersects(parts, structure.unite(frame, flat[forced[flat]]))
         if np.any(large):
             walls = shapely.multipolygons(parts[large])
             walls_by_area.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
     return [walls_by_area[i][1] for i in rank(np.array([area for area, _ in walls_by_area]))]
 
 
-def _may_hold_wall(structure: Structure, frame: Frame, flat: Ints, least: float) -> bool:
+def _may_hold_wall(structure: Structure, frame: PlaneFrame, flat: Ints, least: float) -> bool:
     """Whether these triangles in a plane may hold a wall of an area, m²: not the seats of a hundred
     benches, which are in small clusters by their boxes."""
     if len(flat) > _SEVERAL or structure.forced[flat].any():
@@ -176,7 +176,7 @@ def _may_hold_wall(structure: Structure, frame: Frame, flat: Ints, least: float)
     corner, gap = frame.to_plane(structure.corners[flat]), structure.tolerance.hairline
     low, high = corner.min(axis=1) - gap / 2, corner.max(axis=1) + gap / 2
     boxes = shapely.box(*low.T, *high.T)
-    group = connected(len(flat), shapely.STRtree(boxes).query(boxes).T)
+    group = connect(len(flat), shapely.STRtree(boxes).query(boxes).T)
     return bool((sum_by_group(group, structure.areas[flat], len(flat)) >= least).any())
 
 
@@ -280,7 +280,7 @@ class Surroundings:
         sure = (hit >= 0).all(axis=0) & (away[0] == away[1])
         return bool(sure.any() and away[0, sure].mean() >= _AWAY)
 
-    def floored(self, points: Floats) -> Bools:
+    def have_floor(self, points: Floats) -> Bools:
         """(n,) whether the surface straight below each of (n, 3) points faces up."""
         hit = self._hits(points, np.tile([0.0, -1.0, 0.0], (len(points), 1)))
         result: Bools = ((hit >= 0) & (self._front[hit, 1] > 0)).all(axis=0)
@@ -299,7 +299,7 @@ class Surroundings:
         facing[met] = normal
         return distance, facing
 
-    def inside(self, points: Floats, roofed: bool = True) -> Bools:
+    def enclose(self, points: Floats, roofed: bool = True) -> Bools:
         """(n,) which of (n, 3) points are between walls and, if the building is ``roofed``, under a
         roof."""
         result = np.zeros(len(points), dtype=np.bool_)

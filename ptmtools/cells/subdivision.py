@@ -39,12 +39,11 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.places import eye_region, meets
 from ptmtools.cells.planar import count, counting
-from ptmtools.cells.planes import bounds, boxes_meet
-from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.planes import Polyhedron, bounds, boxes_meet
 from ptmtools.cells.roles import matches
-from ptmtools.cells.rooms import grouped
+from ptmtools.cells.rooms import group_cells
 from ptmtools.cells.sight import seen_from_places
-from ptmtools.cells.space import Space, divide, divide_inside
+from ptmtools.cells.space import DividedSpace, divide, divide_inside
 from ptmtools.cells.structure import LOOKS, Structure, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
@@ -81,7 +80,7 @@ def subdivide(
     options, executor = options or SubdivideOptions(), executor or Executor()
     _check(scene, options)
     with counting() as undecided:
-        building = Building.of(scene, options, executor)
+        building = Building.from_scene(scene, options, executor)
         space, notes = _divide_scene(scene, building, progress, executor)
         cells = _cut_and_group(scene, building, space, notes, executor)
     check_seen(scene, cells)
@@ -90,7 +89,7 @@ def subdivide(
 
 def _divide_scene(
     scene: Scene, building: Building, progress: Progress, executor: Executor
-) -> tuple[Space, list[str]]:
+) -> tuple[DividedSpace, list[str]]:
     """The divided space of a scene, the first root box if that is closed, else the second; and
     notes on it."""
     wide, tight = _root_boxes(scene, building.structure)
@@ -135,7 +134,7 @@ def _root_boxes(scene: Scene, structure: Structure) -> tuple[Polyhedron, Floats]
     return replace(wide, points=wide.points @ axes), tight
 
 
-def _space_notes(scene: Scene, building: Building, space: Space) -> list[str]:
+def _space_notes(scene: Scene, building: Building, space: DividedSpace) -> list[str]:
     """Notes on doors, and on space that cannot be reached."""
     options, notes = building.options, []
     if options.doors != "closed":
@@ -157,7 +156,7 @@ def _limit_note(unsplit: int, limit: int, many: bool) -> str:
 
 
 def _cut_and_group(
-    scene: Scene, building: Building, space: Space, notes: list[str], executor: Executor
+    scene: Scene, building: Building, space: DividedSpace, notes: list[str], executor: Executor
 ) -> Cells:
     """The geometry of a scene cut to the leaves of a space, and these grouped into cells."""
     options, tolerance = building.options, building.structure.tolerance
@@ -168,7 +167,7 @@ def _cut_and_group(
     name = np.append(compact_numbers(seen_from_places(cells, executor)), np.int32(-1))
     cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
     dropped = [*leaf_notes(cells, space.reached), *triangle_notes(scene, pieces, name[owner])]
-    cells = grouped(replace(cells, notes=(*cells.notes, *dropped)), options, building.volumes)
+    cells = group_cells(replace(cells, notes=(*cells.notes, *dropped)), options, building.volumes)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
     if options.doors == "hidden":
         owner[np.isin(pieces.source, opened)] = -1
@@ -176,7 +175,7 @@ def _cut_and_group(
     return replace(cells, **vars(join_pieces(scene, pieces, owner, tolerance)), opened=opened)
 
 
-def _portal_count(space: Space) -> int:
+def _portal_count(space: DividedSpace) -> int:
     """The number of portals between reached leaves."""
     ends = np.array([portal.leaves for portal in space.portals], dtype=np.int64).reshape(-1, 2)
     return int(np.count_nonzero(space.reached[ends].all(axis=1)))
@@ -199,7 +198,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _open_note(space: Space, roofed: float, box: Floats, ceiling: float | None) -> str:
+def _open_note(space: DividedSpace, roofed: float, box: Floats, ceiling: float | None) -> str:
     if roofed < ROOFED:
         state = f"open at the top: {1 - roofed:.0%} of the floor has no ceiling"
     elif not space.reached.any():
@@ -219,7 +218,7 @@ def _open_note(space: Space, roofed: float, box: Floats, ceiling: float | None) 
 def assemble_cells(
     scene: Scene,
     building: Building,
-    space: Space,
+    space: DividedSpace,
     pieces: Pieces,
     owner: NDArray[np.int32],
     notes: list[str],
@@ -284,7 +283,7 @@ def _rename_children(children: NDArray[np.int32], rename: NDArray[np.int32]) -> 
 def _viewers(
     scene: Scene,
     building: Building,
-    space: Space,
+    space: DividedSpace,
     bodies: list[Polyhedron],
     rename: NDArray[np.int32],
 ) -> tuple[Bools, Floats, list[str]]:
@@ -300,7 +299,7 @@ def _viewers(
         for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
     )
     leaf = _leaf_at(space, rename, viewpoints)
-    notes += viewpoint_notes(_buried(building, viewpoints, eye_floor))
+    notes += viewpoint_notes(_find_buried(building, viewpoints, eye_floor))
     # Viewers stand at requested viewpoints, whatever the floor there.
     leaf = np.append(leaf, _leaf_at(space, rename, cameras))
     standing[leaf[leaf >= 0]] = True
@@ -321,14 +320,16 @@ def compact_numbers(keep: Bools) -> NDArray[np.int32]:
     return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
 
 
-def _standing(building: Building, bodies: list[Polyhedron], space: Space) -> tuple[Bools, Floats]:
+def _standing(
+    building: Building, bodies: list[Polyhedron], space: DividedSpace
+) -> tuple[Bools, Floats]:
     """(L,) whether a viewer can stand in a leaf, and `Cells.eye_floor`."""
     walker, tolerance = building.walker, building.structure.tolerance
     if building.options.standing == "anywhere":
         return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
     boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
     places = building.places
-    places = places.only(places.near(boxes - [0, walker.middle, 0]))
+    places = places.only(places.find_near(boxes - [0, walker.middle, 0]))
     if space.ceiling is not None:
         places = places.without_tops(space.ceiling - tolerance.plane, walker.radius)
     eyes = eye_region(places, walker, tolerance)
@@ -338,14 +339,14 @@ def _standing(building: Building, bodies: list[Polyhedron], space: Space) -> tup
     return meets(eyes, bodies, walker, tolerance), floor[near]
 
 
-def _leaf_at(space: Space, rename: NDArray[np.int32], points: Floats) -> NDArray[np.int32]:
+def _leaf_at(space: DividedSpace, rename: NDArray[np.int32], points: Floats) -> NDArray[np.int32]:
     """(n,) the new number of the leaf that contains each of (n, 3) points, or -1."""
     leaf = rename[-2 - descend(space.tree.planes, space.tree.children, points)]
     inside = ((points >= space.box[0]) & (points <= space.box[1])).all(axis=1)
     return np.where(inside, leaf, -1).astype(np.int32)
 
 
-def _buried(building: Building, points: Floats, eye_floor: Floats) -> Floats:
+def _find_buried(building: Building, points: Floats, eye_floor: Floats) -> Floats:
     """The (n, 3) points that lie inside a solid, unless bodies on the ``eye_floor`` do so
     too: in a model whose room faces point outwards, solids cannot be recognised."""
     structure = building.structure

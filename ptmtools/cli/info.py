@@ -292,7 +292,7 @@ def _guess(guess: Guess) -> str:
 def _closed_text(around: Enclosure) -> str:
     if not around.rooms:
         return "unknown: no place has a roof above and walls around it"
-    if around.closed:
+    if around.looks_closed:
         return "probably; no sight line from a room leaves the building"
     roof = "" if around.roofed > 0.99 else f"; {1 - around.roofed:.0%} of the floor has no ceiling"
     return (
@@ -315,7 +315,7 @@ def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:
         "space": vars(scene.space),
         "size": _size(scene),
         "looks": [asdict(guess) for guess in (model.best, *model.others)],
-        "enclosure": asdict(around) | {"closed": around.closed},
+        "enclosure": asdict(around) | {"closed": around.looks_closed},
         "storeys": [vars(storey) for storey in scene.storeys],
         "rooms": [room.name for room in scene.rooms],
         "notes": [vars(note) for note in scene.notes],

@@ -150,7 +150,7 @@ class CellVolume:
         self.empty = len(self.tetrahedra) == 0
         if not self.empty:
             points = self.tetrahedra.reshape(-1, 3)
-            low, high = eyes.clipped(points.min(axis=0), points.max(axis=0))
+            low, high = eyes.clip(points.min(axis=0), points.max(axis=0))
             self._low, self._size = low, np.maximum(high - low, 0.0)
             size = float(np.prod(np.ptp(points, axis=0)))
             self.boxed = float(self.volume.sum()) / size >= FILLED

@@ -305,6 +305,6 @@ def _eye_boxes(cells: Cells) -> tuple[Floats, Floats, Ints]:
     leaf = leaf[np.argsort(cells.leaf_cell[leaf], kind="stable")]
     boxes = np.empty((2, len(leaf), 3))
     for i, points in enumerate(map(cells.leaf_points, leaf.tolist())):
-        boxes[:, i] = eyes.clipped(points.min(axis=0), points.max(axis=0))
+        boxes[:, i] = eyes.clip(points.min(axis=0), points.max(axis=0))
     start = np.searchsorted(cells.leaf_cell[leaf], np.arange(cells.cell_count + 1))
     return boxes[0], boxes[1], start

@@ -23,7 +23,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.cells.model import Cells
-from ptmtools.cells.search import Nearby, connected
+from ptmtools.cells.search import Nearby, connect
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
@@ -118,7 +118,7 @@ def edge_groups(edge: Ints) -> Ints:
     order = np.argsort(edge, axis=None, kind="stable")
     same = np.flatnonzero(np.diff(edge.reshape(-1)[order]) == 0)
     first, second = order[same] // 3, order[same + 1] // 3
-    return connected(len(edge), np.stack([first, second], axis=1))
+    return connect(len(edge), np.stack([first, second], axis=1))
 
 
 def closed_and_oriented(edge: Ints, forward: Bools, group: Ints) -> tuple[Bools, Bools]:

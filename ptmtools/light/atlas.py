@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, Singles, areas
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.jit import kernel
 from ptmtools.lazy import component
 from ptmtools.light.packing import pack
@@ -134,7 +134,7 @@ def _pack(
     charts = 0
     for faces, uv, index in zip(parts, packed.uv, packed.index, strict=True):
         texel[faces] = uv.astype(np.float64)[index] * [packed.width, packed.height]
-        chart[faces] = charts + connected(len(uv), index)[index[:, 0]]
+        chart[faces] = charts + connect(len(uv), index)[index[:, 0]]
         charts += len(uv)
     return _Layout(texel, chart, got), density
 

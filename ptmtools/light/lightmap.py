@@ -238,16 +238,16 @@ def _fit(vertex: Ints, share: Floats, seen: Singles, area: Floats) -> Floats:
     )
     within = share.T @ share / POINTS
 
-    def gathered(at_corners: Floats) -> Floats:
+    def gather(at_corners: Floats) -> Floats:
         return np.asarray(np.bincount(vertex.ravel(), at_corners.ravel(), count), np.float64)
 
-    mass = gathered(np.repeat(weight, 3).reshape(-1, 3) / 3)
-    mean = gathered(np.outer(weight * seen.mean(axis=1), np.full(3, 1 / 3))) / mass
+    mass = gather(np.repeat(weight, 3).reshape(-1, 3) / 3)
+    mean = gather(np.outer(weight * seen.mean(axis=1), np.full(3, 1 / 3))) / mass
 
     def times(value: Floats) -> Floats:
-        return gathered(weight[:, None] * (value[vertex] @ within)) + _STEADY * mass * value
+        return gather(weight[:, None] * (value[vertex] @ within)) + _STEADY * mass * value
 
-    target = gathered(weight[:, None] * (seen @ share) / POINTS) + _STEADY * mass * mean
+    target = gather(weight[:, None] * (seen @ share) / POINTS) + _STEADY * mass * mean
     value = mean.copy()
     rest = target - times(value)
     way = rest / mass

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.errors import naming
 from ptmtools.light.occlusion import (
     Occluders,
@@ -250,4 +250,4 @@ def planes(
         alike &= np.abs(np.einsum("nx,nx->n", normal[first], normal[second])) >= cosine
         pairs.append(np.stack([first[alike], second[alike]], axis=1))
     joined = np.concatenate(pairs)
-    return connected(count, joined)
+    return connect(count, joined)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.search import connected, distinct
+from ptmtools.cells.search import connect, distinct
 from ptmtools.simplification.model import Mesh
 from ptmtools.tolerance import FILE_SHARE
 
@@ -198,7 +198,7 @@ def _constraints(
         np.concatenate([end[is_edge_constrained] for end in edges.ends]), minlength=count
     )
     pairs = [[first, next_corner(second)], [next_corner(first), second]]
-    return constraint, connected(triangle.size, np.concatenate(pairs, axis=1).T), ends
+    return constraint, connect(triangle.size, np.concatenate(pairs, axis=1).T), ends
 
 
 def next_corner(corner: Ints) -> Ints:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.jit import plain_kernel as kernel
 from ptmtools.simplification.model import Mesh
 from ptmtools.simplification.surface import HalfEdges, WeldedSurface, edges_of, next_corner
@@ -70,7 +70,7 @@ def topology(surface: WeldedSurface) -> Topology:
         # Count a vertex once for each fan of faces that touches there.
         fan = _fans(edges, triangle.size)
         begin, end = fan[boundary], fan[next_corner(boundary)]
-        loops = len(np.unique(connected(triangle.size, np.stack([begin, end], axis=1))[begin]))
+        loops = len(np.unique(connect(triangle.size, np.stack([begin, end], axis=1))[begin]))
         characteristic = len(np.unique(fan)) - len(edges.start) + len(triangle)
         handles = max(0, (2 * parts - loops - characteristic) // 2)
     return Topology(handles, parts - open_parts, open_parts)
@@ -81,7 +81,7 @@ def parts_of(edges: HalfEdges, faces: int) -> Ints:
     shares_edge = np.ones(len(edges.order), np.bool_)
     shares_edge[edges.start] = False
     later = np.flatnonzero(shares_edge)
-    return connected(faces, edges.order[np.stack([later - 1, later], axis=1)] // 3)
+    return connect(faces, edges.order[np.stack([later - 1, later], axis=1)] // 3)
 
 
 def _fans(edges: HalfEdges, corners: int) -> Ints:
@@ -94,7 +94,7 @@ def _fans(edges: HalfEdges, corners: int) -> Ints:
         np.where(agree, next_corner(second), second),
         np.where(agree, second, next_corner(second)),
     )
-    return connected(corners, np.concatenate([[first, begin], [next_corner(first), end]], axis=1).T)
+    return connect(corners, np.concatenate([[first, begin], [next_corner(first), end]], axis=1).T)
 
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -153,7 +153,7 @@ def fill_small_holes(mesh: Mesh, surface: WeldedSurface, faces: int) -> FilledMe
     next_edge = np.full(triangle.size, NON_MANIFOLD)
     link_boundaries(opposite, next_edge)
 
-    part = connected(len(surface.point), np.stack(edges.ends, axis=1))
+    part = connect(len(surface.point), np.stack(edges.ends, axis=1))
     low, high = np.full(surface.point.shape, np.inf), np.full(surface.point.shape, -np.inf)
     np.minimum.at(low, part, surface.point)
     np.maximum.at(high, part, surface.point)

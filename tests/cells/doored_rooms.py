@@ -12,7 +12,7 @@ import numpy as np
 
 from ptmtools.cells import Cells, SubdivideOptions
 from ptmtools.cells.doors import Doors
-from ptmtools.cells.search import connected
+from ptmtools.cells.search import connect
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.scene.model import Scene
 from ptmtools.visibility import compute_pvs
@@ -78,7 +78,7 @@ def together(cells: Cells, *points: tuple[float, float, float]) -> bool:
     """Whether all points are in cells that hang together through portals."""
     at = cells.locate_leaf(np.array(points))
     ends = cells.portal_leaf.astype(np.int64)
-    group = connected(cells.leaf_count, ends)
+    group = connect(cells.leaf_count, ends)
     return bool((at >= 0).all() and len(set(group[at])) == 1)
 
 
@@ -92,8 +92,8 @@ def leaf_names(scene: Scene, **options: object) -> list[str]:
     """The names of the door leaves of a scene."""
     chosen = SubdivideOptions(**options)  # type: ignore[arg-type]
     tolerance = scene.tolerance.for_walls(chosen.wall_thickness)
-    opaque = Opaque.of(scene, chosen)
-    doors, _ = Doors.recognise(scene, opaque, Structure.of(opaque, tolerance), chosen)
+    opaque = Opaque.from_scene(scene, chosen)
+    doors, _ = Doors.recognise(scene, opaque, Structure.from_opaque(opaque, tolerance), chosen)
     return [door.name for door in doors.leaves]
 
 

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from ptmtools.arrays import Floats
-from ptmtools.cells import SubdivideOptions, clearance
+from ptmtools.cells import SubdivideOptions, places
 from ptmtools.cells.floors import Floors, detail_of
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import eye_region, find_places
@@ -46,8 +46,8 @@ def areas_of(faces: Floats, walker: Walker = WALKER, times: int = 1) -> tuple[fl
     """m² in plan where one can stand, and where eyes can be, each floor by itself."""
     scene = subdivided(scene_of(faces.tolist()), times)
     options = SubdivideOptions(detail_by_shape=False)
-    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
-    floors = Floors.of(scene, detail_of(scene, structure, options))
+    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
+    floors = Floors.from_scene(scene, detail_of(scene, structure, options))
     places = find_places(floors, structure.corners, walker, scene.tolerance)
     eyes = eye_region(places, walker, structure.tolerance)
     return float(shapely.area(places.plan).sum()), float(shapely.area(shapely.union_all(eyes.plan)))
@@ -74,9 +74,9 @@ def test_floors_that_are_cut_in_two_have_the_same_places(
 ) -> None:
     faces, walker = turned(furnished(seed), 37.0), Walker(radius, 0.5, 1.7)
     whole = areas_of(faces, walker)
-    monkeypatch.setattr(clearance, "_CROWD", 3)
-    monkeypatch.setattr(clearance, "CORNERS", 12)
-    monkeypatch.setattr(clearance, "_SHORT", 0.1)
+    monkeypatch.setattr(places, "_CROWD", 3)
+    monkeypatch.setattr(places, "CORNERS", 12)
+    monkeypatch.setattr(places, "_SHORT", 0.1)
     assert areas_of(faces, walker) == pytest.approx(whole, abs=SLACK)
 
 
@@ -109,7 +109,7 @@ def test_walls_are_widened_at_both_ends() -> None:
         corners = start + np.outer([0, length, rng.random() * length], along)
         corners[:, 1] = 0.6, 1.2, 2.5
         level, band = np.zeros((1, 3)), (0.5, 1.7)
-        left, _ = clearance.clear_of(corners[None], floor, level, band, 1.0, tolerance)
+        left, _ = places.clear_of(corners[None], floor, level, band, 1.0, tolerance)
         taken = 18**2 - shapely.area(left).sum()
         assert taken == pytest.approx(np.pi + 2 * length, abs=0.1)
 
@@ -131,6 +131,6 @@ def test_slivers_as_wide_as_rounding_have_no_union() -> None:
     shapes = np.array(
         [shapely.box(0, 0, 1e-17, 1), shapely.box(0, 1, 1e-17, 2), shapely.box(0, 0, 1, 1)]
     )
-    names, united = clearance.united_by(np.array([7, 7, 9]), shapes, 1e-12)
+    names, united = places.unite_rows(np.array([7, 7, 9]), shapes, 1e-12)
     assert names.tolist() == [9]
     assert shapely.area(united).tolist() == [1.0]

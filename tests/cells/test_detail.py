@@ -105,6 +105,6 @@ def test_nobody_stands_on_a_ball_of_glass(room_faces) -> None:
     scene = replace(scene, materials=(*scene.materials, glass), triangle_material=of)
     for by_shape in (True, False):
         options = SubdivideOptions(detail_by_shape=by_shape)
-        structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
-        floors = Floors.of(scene, detail_of(scene, structure, options))
+        structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
+        floors = Floors.from_scene(scene, detail_of(scene, structure, options))
         assert (len(floors.corners) > 4) != by_shape  # floor and ceiling have four

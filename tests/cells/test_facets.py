@@ -21,12 +21,12 @@ TOLERANCE = Tolerance.for_extent(10.0)
 
 
 def facets_of(corners: np.ndarray) -> Facets:
-    mesh = Welded.of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    return Facets.of(mesh, TOLERANCE)
+    mesh = Welded.from_triangles(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    return Facets.from_mesh(mesh, TOLERANCE)
 
 
 def fewer(facets: Facets) -> tuple[np.ndarray, np.ndarray]:
-    return facets.fewer(np.ones(len(facets.region), dtype=bool), TOLERANCE)
+    return facets.reduce(np.ones(len(facets.region), dtype=bool), TOLERANCE)
 
 
 def grid(n: int, hole: tuple[int, int] | None = None, turn: float = 0.0) -> np.ndarray:
@@ -109,7 +109,9 @@ def test_a_compressed_model_whose_outlines_cross_has_its_walls(shared: Path) -> 
     """At 14 bits, corners of furniture come to lie beyond the edges beside them."""
     scene = ingest(shared / "scenes/apartment_gallery/gallery.glb")
     with counting() as undecided:
-        structure = Structure.of(Opaque.of(scene, SubdivideOptions()), scene.tolerance)
+        structure = Structure.from_opaque(
+            Opaque.from_scene(scene, SubdivideOptions()), scene.tolerance
+        )
     assert undecided["triangles"] > 0
     opaque = scene.corners[scene.opaque]
     assert areas(structure.corners).sum() == pytest.approx(areas(opaque).sum(), rel=0.05)
@@ -148,7 +150,7 @@ def test_structural_names_hold_for_their_own_triangles_alone(quads) -> None:
     faces = np.concatenate(halves)
     scene = scene_of(faces, objects=["a"] * 128 + ["b"] * 128)
     options = SubdivideOptions(structural=("b",))
-    structure = Structure.of(Opaque.of(scene, options), scene.tolerance)
+    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
     assert len(structure.corners) == 4
     right = structure.corners.reshape(4, 9)[:, ::3].mean(axis=1) > 5
     assert np.array_equal(structure.forced, right)
@@ -170,6 +172,8 @@ def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
     monkeypatch.setattr(
         Structure, "lie_in", lambda *arguments: tried.append(1) or lie_in(*arguments)
     )
-    walls = find_walls(Structure.of(Opaque.of(scene, SubdivideOptions()), scene.tolerance), 2.0)
+    walls = find_walls(
+        Structure.from_opaque(Opaque.from_scene(scene, SubdivideOptions()), scene.tolerance), 2.0
+    )
     assert len(tried) < len(scene.triangles) / 2
     assert any(abs(w.frame.plane[3] + 0.02) < 1e-4 and w.blocking.area > 10 for w in walls)

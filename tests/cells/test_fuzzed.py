@@ -37,7 +37,7 @@ def test_samples_of_a_floor_of_any_size_take_little_memory() -> None:
     points = np.random.default_rng(1).random((count, 3)) * [2 * side, side, side]
     tracemalloc.start()
     try:
-        inside = around.inside(points)
+        inside = around.enclose(points)
         most = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

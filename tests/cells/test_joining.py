@@ -13,10 +13,10 @@ import pytest
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide, subdivision
-from ptmtools.cells.joining import Mesh, join_pieces, patches
+from ptmtools.cells.joining import CutMesh, join_pieces, patches
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.planar import triangulated
-from ptmtools.cells.search import first_alike, welded
+from ptmtools.cells.planar import triangulate_rings
+from ptmtools.cells.search import first_alike, weld
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Material, Scene
 
@@ -28,7 +28,7 @@ def taken_apart(monkeypatch: pytest.MonkeyPatch, scene: Scene, **options: Any) -
     """The arguments of `join_pieces` for a scene: all pieces, those without an owner too."""
     given: list[Any] = []
 
-    def spy(*arguments: Any) -> Mesh:
+    def spy(*arguments: Any) -> CutMesh:
         given.append(arguments)
         return join_pieces(*arguments)
 
@@ -42,7 +42,7 @@ def with_owner(owner: np.ndarray) -> np.ndarray:
     return np.where((owner < 0).all(axis=1, keepdims=True), owner.max() + 1, owner)
 
 
-def corners_of(mesh: Mesh) -> np.ndarray:
+def corners_of(mesh: CutMesh) -> np.ndarray:
     return mesh.vertex[mesh.triangle]
 
 
@@ -304,8 +304,8 @@ def test_welded_points_are_near() -> None:
     points = np.array(
         [[0, 0, 0], [1, 0, 0], [1e-9, 0, 0], [1, 1e-7, 0], [-0.0, 0, 0], [2e-9, 0, 0]]
     )
-    assert welded(points, 1.5e-9).tolist() == [0, 1, 0, 3, 0, 0], "by way of another"
-    assert welded(points, 0.0).tolist() == first_alike(points).tolist() == [0, 1, 2, 3, 0, 5]
+    assert weld(points, 1.5e-9).tolist() == [0, 1, 0, 3, 0, 0], "by way of another"
+    assert weld(points, 0.0).tolist() == first_alike(points).tolist() == [0, 1, 2, 3, 0, 5]
 
 
 @pytest.mark.parametrize("turn", np.linspace(0, 3, 7))
@@ -318,7 +318,7 @@ def test_corners_on_straight_edges_are_used(turn: float) -> None:
     rotation = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
     corner = np.array(outer + hole) @ rotation
     start = np.array([0, len(outer), len(outer) + 3])
-    triangle, polygon = triangulated(corner, start, np.array([0, 0]))
+    triangle, polygon = triangulate_rings(corner, start, np.array([0, 0]))
     assert polygon.tolist() == [0] * (16 + 3 + 2 - 2 - 2)
     area = areas(np.pad(corner[triangle], ((0, 0), (0, 0), (0, 1))))
     assert area.sum() == pytest.approx(1 - 0.0625)

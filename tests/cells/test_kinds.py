@@ -96,7 +96,7 @@ def test_the_user_comes_first(kind: Kind, option: str, pattern: str) -> None:
     """By the name of the object or by that of its material, which all objects share."""
     made = classed(scene(rooms(), thing=THING), thing=kind, masonry="structural")
     options = SubdivideOptions(**{option: (pattern,)})  # type: ignore[arg-type]
-    printed = Designated.of(made, options)
+    printed = Designated.from_options(made, options)
     thing = made.triangle_object == made.objects.index("thing")
     for name in ("structural", "detail", "door"):
         assert (getattr(printed, name)[thing] == (name == option)).all()

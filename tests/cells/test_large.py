@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.planes import Polyhedron
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import PvsOptions, compute_pvs
 from ptmtools.visibility.segments import check_conservative

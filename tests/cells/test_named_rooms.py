@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.room_volumes import Volume, Volumes, windings
+from ptmtools.cells.named_rooms import Volume, Volumes, windings
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.model import RoomVolume
 from ptmtools.scene.orientation.space import to_world
@@ -317,11 +317,11 @@ def test_winding_numbers() -> None:
 def test_a_room_of_two_boxes_holds_both() -> None:
     both = np.concatenate([box((0, 0, 0), (1, 1, 1)), box((2, 0, 0), (3, 1, 1))])
     points, faces = welded(both)
-    volume = Volume.of(RoomVolume("", points, faces.astype(np.int32)))
+    volume = Volume.from_room(RoomVolume("", points, faces.astype(np.int32)))
     assert volume.size == pytest.approx(2)
     at = np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]])
     assert volume.contains(at).tolist() == [True, False, True]
 
 
 def test_no_volumes_of_no_rooms(made: Made) -> None:
-    assert Volumes.of(made(carved([HALL]), []), WHOLE) == Volumes()
+    assert Volumes.from_scene(made(carved([HALL]), []), WHOLE) == Volumes()

@@ -184,7 +184,7 @@ def test_an_eye_inside_a_leaf_belongs_to_the_cells_on_both_sides(door: Faces) ->
     assert np.isin(own, both).all()
     masonry = structural_triangles(made, OPEN, cells.opened)
     ends = rng.uniform([0, 0, -2], [12.4, 4, 2], eyes.shape)
-    clear = ~Blockers(made.corners[masonry], cells.root_box).between(eyes, ends)
+    clear = ~Blockers(made.corners[masonry], cells.root_box).block(eyes, ends)
     there = cells.locate(ends)
     clear &= there >= 0
     sets: Bools = compute_pvs(cells).to_matrix()[both].any(axis=0)

@@ -14,21 +14,21 @@ import shapely
 from ptmtools.cells import planar, subdivision
 from ptmtools.cells.diagnostics import undecided_notes
 from ptmtools.cells.planar import (
-    bounded,
     buffer,
+    build_areas,
     counting,
     delaunay,
     difference,
-    divided,
     intersection,
-    left_open,
-    straightened,
-    triangulated,
+    open_part,
+    straighten,
+    triangulate_polygons,
+    triangulate_rings,
     union,
     unite,
-    united_by,
+    unite_rows,
 )
-from ptmtools.cells.space import Space, divide
+from ptmtools.cells.space import DividedSpace, divide
 from ptmtools.cells.subdivision import subdivide
 from ptmtools.tolerance import Tolerance
 
@@ -135,13 +135,13 @@ def test_hostile_outlines_by_the_thousand(scale: float, far: float) -> None:
         shared, rest = intersection(one, other, grid), difference(one, other, grid)
         both = [union(np.array(pair), grid) for pair in zip(one, other, strict=True)]
         union(one, grid)
-        united_by(np.arange(count) // 3, np.asarray(shapely.make_valid(one)), grid)
-        opening = left_open(one, other, tolerance)
+        unite_rows(np.arange(count) // 3, np.asarray(shapely.make_valid(one)), grid)
+        opening = open_part(one, other, tolerance)
         for distance in (scale, -0.1 * scale):
             buffer(one, distance, join_style="mitre")
         delaunay(one)
-        divided(shapely.make_valid(one))
-        straightened(one, grid)
+        triangulate_polygons(shapely.make_valid(one))
+        straighten(one, grid)
     if 1e-100 < scale < 1e100:  # beyond, GEOS cannot tell left from right
         assert undecided.total() - undecided["triangles"] < count / 100
     for result in (shared, rest, np.array(both), opening):
@@ -179,13 +179,13 @@ def test_hostile_outlines_of_segments_and_rings() -> None:
     for _ in range(300):
         corner = np.round(random.uniform(0, 4, (24, 2)), int(random.integers(0, 3)))
         segments = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
-        areas = bounded(segments, np.repeat(np.arange(3), 8))
+        areas = build_areas(segments, np.repeat(np.arange(3), 8))
         assert len(areas) == 3
-        triangle, of = divided(areas)
+        triangle, of = triangulate_polygons(areas)
         corners = {tuple(point) for point in shapely.get_coordinates(areas).tolist()}
         assert all(tuple(point) in corners for point in triangle.reshape(-1, 2).tolist())
         assert np.all(np.diff(of) >= 0)
-        row, _ = triangulated(corner, np.arange(0, 25, 4), np.array([0, 1, 1, 2, 2, 3]))
+        row, _ = triangulate_rings(corner, np.arange(0, 25, 4), np.array([0, 1, 1, 2, 2, 3]))
         assert row.max(initial=0) < len(corner)
 
 
@@ -232,11 +232,11 @@ def test_what_cannot_be_decided_errs_to_the_safe_side_and_is_counted() -> None:
         assert buffer(low, -1.0, more=True).equals(low)
         # Row by row.
         assert [one.area for one in difference(both, low, grid)] == [4, 9]
-        assert len(divided(both)[0]) == 0
-        assert bounded(np.zeros((1, 2, 2)), np.zeros(1, np.int64))[0].is_empty
+        assert len(triangulate_polygons(both)[0]) == 0
+        assert build_areas(np.zeros((1, 2, 2)), np.zeros(1, np.int64))[0].is_empty
         square = np.array([[0, 0], [2, 0], [2, 2], [0, 2.0]])
-        assert len(triangulated(square, np.array([0, 4]), np.array([0]))[0]) == 0
-        assert straightened(low, grid).equals(low)
+        assert len(triangulate_rings(square, np.array([0, 4]), np.array([0]))[0]) == 0
+        assert straighten(low, grid).equals(low)
         assert unite(np.array([[[0, 0], [2, 0], [0, 2.0]]]), grid).area == 2
     assert undecided == {
         "union": 2, "difference": 3, "intersection": 2, "buffer": 3, "triangles": 4,
@@ -262,7 +262,7 @@ def test_a_build_says_what_was_undecided(room_row, monkeypatch: pytest.MonkeyPat
     scene = room_row(2)[0]
     assert not any("polygons in a plane" in note for note in subdivide(scene).notes)
 
-    def at_odds(*arguments: Any) -> Space:
+    def at_odds(*arguments: Any) -> DividedSpace:
         return replace(divide(*arguments), undecided=Counter(union=1))
 
     monkeypatch.setattr(subdivision, "divide", at_odds)

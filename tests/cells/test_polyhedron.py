@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
+from ptmtools.cells.planes import Polyhedron, clip_polygon, cut, section
 
 ROUNDING = 1e-9
 UNIT = Polyhedron.box(np.zeros(3), np.ones(3))

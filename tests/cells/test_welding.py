@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.cells import search
 from ptmtools.cells.facets import Welded, across_edges
-from ptmtools.cells.search import connected, distinct
+from ptmtools.cells.search import connect, distinct
 
 ROWS = st.lists(st.tuples(*[st.sampled_from([0.0, -0.0, 1.0, 2.0**60, 1e-300])] * 3), max_size=40)
 
@@ -35,7 +35,7 @@ def test_repeated_and_flat_triangles_are_left_out() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], dtype=np.float64)
     # The second is the first turned over, by another vertex; the third has one corner twice.
     triangles = np.array([[0, 1, 2], [2, 3, 0], [1, 3, 2], [1, 4, 2]])
-    mesh = Welded.of(points, triangles)
+    mesh = Welded.from_triangles(points, triangles)
     assert mesh.source.tolist() == [0, 3]
     assert np.array_equal(mesh.corners, points[triangles[[0, 3]]])
 
@@ -61,4 +61,4 @@ def test_connected_indices_are_those_of_a_flood(seed: int, count: int, width: in
     for _ in range(25):
         for row in rows:
             label[row] = label[row].min()
-    assert np.array_equal(connected(25, rows), label)
+    assert np.array_equal(connect(25, rows), label)

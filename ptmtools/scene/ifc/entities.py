@@ -2,7 +2,7 @@
 materials, and which spaces are rooms.
 
 A space (IfcSpace) is never drawn. Spaces that contain other spaces, gross floor areas and spaces
-without a volume are no rooms; `ptmtools.cells.room_volumes` tests the meshes of the others. A room
+without a volume are no rooms; `ptmtools.cells.named_rooms` tests the meshes of the others. A room
 has the long name of its space ("Kitchen"); if other rooms have the same one, or if there is none,
 the name, which most programs fill with a number, is added ("Office 1.07").
 """

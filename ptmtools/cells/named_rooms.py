@@ -1,4 +1,5 @@
-"""The rooms that a model names (IfcSpace): which volumes are usable, and which leaves are in them.
+"""The rooms that a model names (IfcSpace): which volumes are usable, which leaves are in them, and
+splits where two of them touch without a wall.
 
 A volume may be anything: open, a duplicate, that of a storey, far too large. One is left out, with
 a note, unless it
@@ -13,9 +14,16 @@ A leaf is in a volume if at least half of it is: of the part where eyes can be, 
 because volumes often end at a suspended ceiling. Of several volumes the one counts that has the
 largest share, of equal ones the smallest: volumes overlap where programs export areas of several
 kinds. Points spread over volumes and leaves decide (intersecting leaves with meshes exactly would
-take seconds for a thousand leaves); after the splits of `room_planes` most shares are 0 or 1.
+take seconds for a thousand leaves). A room has the name of the volume that most of it is in.
 
-A room has the name of the volume that most of it is in.
+In an open plan, a kitchen and the living room are two rooms of one leaf. A **contact** is the part
+that a face of one volume and a face of another share: they face each other and are no farther
+apart, or overlap no deeper, than a wall is thick. Its plane, half way between the two, splits the
+leaves around it, once all other splits and the flood are done, so that no wall depends on it.
+Nothing blocks in it but the structure that lies in it, so it becomes a portal. Volumes often end in
+the middle of walls, where a contact would split the wall's inside and every doorway. So both parts
+of a leaf must be deeper than a wall may be, and the part of the contact in the leaf wider than a
+visitor: volumes overlap their neighbours by some centimetres.
 """
 
 from __future__ import annotations
@@ -25,13 +33,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints, cross, volumes
+from ptmtools.arrays import Bools, Floats, Ints, areas, cross, normals, volumes
+from ptmtools.cells.bsp import Tree
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.planar import Geometry, buffer, intersection, unite
+from ptmtools.cells.planes import PlaneFrame, Polyhedron, bounds, cut, section
+from ptmtools.cells.portals import Portal, find_portals
+from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.quantities import count
 from ptmtools.scene.model import RoomVolume, Scene
-from ptmtools.tolerance import TIE_SHARE
+from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
 #: Points in the box of a volume, and in a leaf.
 _IN_BOX, _IN_LEAF = 216, 32
@@ -64,7 +78,7 @@ class Volume:
     size: float
 
     @staticmethod
-    def of(room: RoomVolume) -> Volume:
+    def from_room(room: RoomVolume) -> Volume:
         """A volume of any mesh, with its faces outwards if it is closed."""
         corners = room.points[room.triangles]
         middle = corners.reshape(-1, 3).sum(axis=0) / max(3 * len(corners), 1)
@@ -85,7 +99,7 @@ class Volume:
         return points, windings(points, self.corners)
 
     @property
-    def closed(self) -> bool:
+    def is_closed(self) -> bool:
         """Whether the mesh is closed, but for small gaps."""
         winding = self.samples[1]
         return bool((np.abs(winding - np.rint(winding)) >= _WHOLE).mean() <= _NOT_WHOLE)
@@ -133,7 +147,7 @@ class Volumes:
     notes: tuple[str, ...] = ()
 
     @staticmethod
-    def of(scene: Scene, options: SubdivideOptions) -> Volumes:
+    def from_scene(scene: Scene, options: SubdivideOptions) -> Volumes:
         """The usable volumes of a scene; none with `--spaces none`."""
         if options.spaces == "none" or not scene.rooms:
             return Volumes()
@@ -144,12 +158,12 @@ class Volumes:
         )
         omitted: dict[str, list[str]] = {}
         rooms: list[Volume] = []
-        for room in map(Volume.of, scene.rooms):
+        for room in map(Volume.from_room, scene.rooms):
             if not room.size >= least:
                 omitted.setdefault("too small for a visitor", []).append(room.name)
             elif room.size > (1 + TIE_SHARE) * building_size:
                 omitted.setdefault("larger than the building", []).append(room.name)
-            elif not room.closed:
+            elif not room.is_closed:
                 omitted.setdefault("not closed", []).append(room.name)
             else:
                 rooms.append(room)
@@ -159,10 +173,10 @@ class Volumes:
                 omitted.setdefault(fault, []).append(room.name)
             else:
                 kept.append(room)
-        notes = tuple(left_out(names, fault) for fault, names in omitted.items())
+        notes = tuple(left_out_note(names, fault) for fault, names in omitted.items())
         return Volumes(tuple(kept), notes)
 
-    def of_leaves(self, cells: Cells) -> Ints:
+    def assign_leaves(self, cells: Cells) -> Ints:
         """(L,) the volume that each leaf is in, -1 for none."""
         if not self.rooms:
             return np.full(cells.leaf_count, -1, dtype=np.int64)
@@ -213,7 +227,7 @@ def _find_repeats(rooms: Sequence[Volume]) -> list[str]:
     return faults
 
 
-def left_out(names: Sequence[str], reason: str) -> str:
+def left_out_note(names: Sequence[str], reason: str) -> str:
     """The note on spaces that were left out."""
     called = ", ".join(name for name in names[:_NAMED] if name)
     more = ", …" if len(names) > _NAMED else ""
@@ -245,7 +259,7 @@ def unused_notes(volumes: Volumes, before: Ints, after: Ints) -> Iterator[str]:
     several = [k for k in rooms if (before == k).any() and not (after == k).any()]
     for which, reason in ((empty, "no cell is mostly inside"), (several, "several rooms in one")):
         if which:
-            yield left_out([volumes.rooms[k].name for k in which], reason)
+            yield left_out_note([volumes.rooms[k].name for k in which], reason)
 
 
 def name_cells(cells: Cells, volumes: Volumes, volume: Ints, room: Ints) -> Cells:
@@ -273,3 +287,179 @@ def name_cells(cells: Cells, volumes: Volumes, volume: Ints, room: Ints) -> Cell
     if not number:
         return cells
     return replace(cells, cell_room=cell_room, rooms=tuple(called[r] for r in number))
+
+
+#: Contacts are compared by the share of the leaf's section that they cover, in this many digits.
+_CONTACT_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The plane between two volumes, the part of it in which they touch, and its box in space."""
+
+    frame: PlaneFrame
+    shape: Geometry
+    low: Floats
+    high: Floats
+
+
+def contacts(
+    rooms: Sequence[Volume], options: SubdivideOptions, tolerance: Tolerance
+) -> tuple[Contact, ...]:
+    """The contacts of volumes with the area of a wall, in the order of the volumes."""
+    gap = options.wall_thickness + tolerance.plane
+    boxes = np.array([room.box for room in rooms]).reshape(-1, 2, 3)
+    layers: dict[int, list[tuple[Floats, Floats]]] = {}
+    result = []
+    for i, box in enumerate(boxes):
+        later = boxes[i + 1 :]
+        near = ((later[:, 0] <= box[1] + gap) & (later[:, 1] >= box[0] - gap)).all(axis=1)
+        for j in (i + 1 + np.flatnonzero(near)).tolist():
+            for k in {i, j} - layers.keys():
+                layers[k] = _layers(rooms[k].corners, options.wall_area, tolerance)
+            for plane, faces in layers[i]:
+                for opposite, opposite_faces in layers[j]:
+                    contact = _contact(
+                        plane, faces, opposite, opposite_faces, gap, options.wall_area, tolerance
+                    )
+                    result += [contact] if contact else []
+    return tuple(result)
+
+
+def _layers(corners: Floats, least: float, tolerance: Tolerance) -> list[tuple[Floats, Floats]]:
+    """The planes, (4,) facing outwards, in which a mesh has an area of at least ``least`` m², and
+    its triangles there."""
+    size = areas(corners)
+    waiting = rank(size)[: np.count_nonzero(size > 0)]
+    result = []
+    while len(waiting):
+        normal = normals(corners[waiting[:1]])[0]
+        normal = normal / np.linalg.norm(normal)
+        plane = np.append(normal, -normal @ corners[waiting[0], 0])
+        members = _lie_in(plane, corners[waiting], tolerance)
+        members[0] = True
+        if size[waiting[members]].sum() >= (1 - TIE_SHARE) * least:
+            result.append((plane, corners[waiting[members]]))
+        waiting = waiting[~members]
+    return result
+
+
+def _lie_in(plane: Floats, corners: Floats, tolerance: Tolerance) -> Bools:
+    """(n,) which triangles lie in a plane and face the same side."""
+    within = (np.abs(corners @ plane[:3] + plane[3]) <= tolerance.plane).all(axis=1)
+    return np.asarray(within & (normals(corners) @ plane[:3] > 0))
+
+
+def _contact(
+    plane: Floats,
+    faces: Floats,
+    opposite: Floats,
+    opposite_faces: Floats,
+    gap: float,
+    least: float,
+    tolerance: Tolerance,
+) -> Contact | None:
+    """The contact of the ``faces`` of one volume in a plane with those of another volume; None if
+    they do not face each other, are more than ``gap`` metres apart or share less than ``least``
+    m²."""
+    if plane[:3] @ opposite[:3] > -tolerance.cosine:
+        return None
+    apart = plane[3] + opposite[3]
+    if abs(apart) > gap:
+        return None
+    between = plane.copy()
+    between[3] -= apart / 2
+    frame = PlaneFrame.from_plane(between)
+    first, second = (
+        unite(frame.to_plane(part), tolerance.grid) for part in (faces, opposite_faces)
+    )
+    shape = intersection(np.array([first]), np.array([second]), tolerance.grid)[0]
+    if not shapely.area(shape) >= (1 - TIE_SHARE) * least:
+        return None
+    points = frame.to_space(shapely.get_coordinates(shape))
+    return Contact(frame, shape, *bounds(points))
+
+
+def split_at(
+    contacts: Sequence[Contact],
+    tree: Tree,
+    portals: list[Portal],
+    reached: Bools,
+    structure: Structure,
+    options: SubdivideOptions,
+) -> tuple[Tree, list[Portal], Bools]:
+    """A tree, its portals and its (L,) reached leaves, with those leaves split at the contacts."""
+    tolerance = structure.tolerance
+    boxes = np.array([(contact.low, contact.high) for contact in contacts]).reshape(-1, 2, 3)
+    leaves, walls = list(tree.leaves), list(tree.walls)
+    children = [row.tolist() for row in tree.children]
+    parent = {-2 - c: (n, side) for n, row in enumerate(children) for side, c in enumerate(row)}
+    waiting = np.flatnonzero(reached).tolist()[::-1] if contacts else []
+    stale: set[int] = set()
+    while waiting and len(leaves) < options.max_leaves:
+        leaf = waiting.pop()
+        body = leaves[leaf]
+        low, high = bounds(body.points)
+        near = ((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)
+        around = [contacts[k] for k in np.flatnonzero(near).tolist()]
+        contact = _best(around, body, options, tolerance)
+        if contact is None:
+            continue
+        node, back = len(walls), len(leaves)
+        parts = cut(body, contact.frame.plane, node, tolerance.rounding)
+        if parts[0] is None or parts[1] is None:
+            raise AssertionError("a split that was accepted has two sides")
+        if leaf in parent:
+            at, side = parent[leaf]
+            children[at][side] = node
+        children.append([-2 - leaf, -2 - back])
+        parent[leaf], parent[back] = (node, 0), (node, 1)
+        walls.append(_plane(contact, structure))
+        leaves[leaf] = parts[0]
+        leaves.append(parts[1])
+        stale.update([node, *(tag for tag in body.tags if tag >= 0)])
+        waiting += [back, leaf]
+    if not stale:
+        return tree, portals, reached
+    tree = replace(
+        tree,
+        walls=tuple(walls),
+        children=np.array(children, dtype=np.int32).reshape(-1, 2),
+        leaves=tuple(leaves),
+    )
+    kept = [portal for portal in portals if portal.node not in stale]
+    kept += find_portals(tree, tolerance, sorted(stale))
+    added = np.ones(len(leaves) - len(reached), dtype=np.bool_)
+    return tree, sorted(kept, key=lambda portal: portal.node), np.append(reached, added)
+
+
+def _best(
+    contacts: Sequence[Contact], body: Polyhedron, options: SubdivideOptions, tolerance: Tolerance
+) -> Contact | None:
+    """The contact that covers the largest share of a body's section, None if none splits it."""
+    deep, radius = max(options.wall_thickness, tolerance.thin), options.walker[0]
+    best, best_share = None, 0.0
+    for contact in contacts:
+        plane = contact.frame.plane
+        reach = body.points @ plane[:3] + plane[3]
+        if min(reach.max(), -reach.min()) < deep:
+            continue
+        outline = section(body, plane, tolerance.rounding)
+        if len(outline) < 3:
+            continue
+        region = shapely.polygons(contact.frame.to_plane(outline))
+        shape = intersection(np.array([contact.shape]), np.array([region]), tolerance.grid)[0]
+        share = round(float(shapely.area(shape) / shapely.area(region)), _CONTACT_DIGITS)
+        if share > best_share and not shapely.is_empty(buffer(shape, -radius, join_style="mitre")):
+            best, best_share = contact, share
+    return best
+
+
+def _plane(contact: Contact, structure: Structure) -> WallPlane:
+    """The plane of a contact, and the structure that blocks in it."""
+    plane = contact.frame.plane
+    near: Ints = structure.nearby.find_between(
+        plane, -structure.tolerance.plane, structure.tolerance.plane
+    )
+    blocking = structure.unite(contact.frame, near[structure.lie_in(plane, near)])
+    return WallPlane(contact.frame, contact.shape, blocking)
