@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ptmtools.glb import COMPONENTS, FLOAT, INT, ITEMS, SHORT, BufferWriter
 from ptmtools.meshopt.encoding import by_first_use
 from ptmtools.output.geometry import Shape
-from ptmtools.scene.colors import packed, to_linear, unpacked
+from ptmtools.scene.colors import pack_colors, to_linear, unpack_colors
 
 #: Whole numbers below this are written without the ".0" that Python gives them.
 _WHOLE = 1e15
@@ -74,8 +74,8 @@ def vertices_of(tables: VertexTables, shape: Shape, *, textured: bool) -> Vertic
         vertex, second = vertex[both // len(table)], table[both % len(table)]
     rgba = None
     if shape.color is not None:
-        both, triangle = by_first_use(triangle << 24 | packed(shape.color))
-        vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
+        both, triangle = by_first_use(triangle << 24 | pack_colors(shape.color))
+        vertex, color = vertex[both >> 24], unpack_colors(both & 0xFFFFFF)
         second = None if second is None else second[both >> 24]
         # 8 bits of linear light would be too few in the dark.
         rgba = np.full((len(color), 4), 65535, np.uint16)

@@ -25,7 +25,7 @@ from ptmtools.output.convexity import convex_hull, hull_rows, slack_of
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.names import ROOT, VRML_FILES, DefNames, cell_file, cell_name, path_of
 from ptmtools.output.numbers import decimal, row_texts, single
-from ptmtools.scene.colors import packed, unpacked
+from ptmtools.scene.colors import pack_colors, unpack_colors
 from ptmtools.scene.model import Material
 
 
@@ -179,8 +179,8 @@ class CellWriter:
                 parts.append(f"    color Color {{ color [ {_color(material)} ] }}\n")
                 parts.append(f"    colorIndex {zeros}\n    colorPerVertex FALSE\n")
         if s.color is not None:
-            colors, place = np.unique(packed(s.color), return_inverse=True)
-            rows = row_texts(single(np.round(unpacked(colors) / 255, _DIGITS), "colours"))
+            colors, place = np.unique(pack_colors(s.color), return_inverse=True)
+            rows = row_texts(single(np.round(unpack_colors(colors) / 255, _DIGITS), "colours"))
             parts.append(f"    color Color {{ color {field(rows)} }}\n")
             parts.append(f"    colorIndex {loops(place.reshape(-1, 3))}\n")
         parts.append("  }\n}\n")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.jit import inlined_kernel, plain_kernel as kernel
-from ptmtools.portal_flow.storage import Geometry, Polygons
+from ptmtools.portal_flow.storage import Polygons, PortalArrays
 
 #: A unit normal and an offset.
 Plane = tuple[float, float, float, float]
@@ -129,16 +129,16 @@ def separators_through(
         scale = 1.0 / np.sqrt(1.0 + t * t)
         t *= sign
         m0, m1, m2 = (w0 + t * n0) * scale, (w1 + t * n1) * scale, (w2 + t * n2) * scale
-        near, far = -np.inf, np.inf
+        high, low = -np.inf, np.inf
         for k in range(size_a):
-            near = max(near, m0 * polygon[a, k, 0] + m1 * polygon[a, k, 1] + m2 * polygon[a, k, 2])
+            high = max(high, m0 * polygon[a, k, 0] + m1 * polygon[a, k, 1] + m2 * polygon[a, k, 2])
         for k in range(size_b):
-            far = min(far, m0 * polygon[b, k, 0] + m1 * polygon[b, k, 1] + m2 * polygon[b, k, 2])
-        if near > far + slack:
+            low = min(low, m0 * polygon[b, k, 0] + m1 * polygon[b, k, 1] + m2 * polygon[b, k, 2])
+        if high > low + slack:
             continue
-        offset = -far
+        offset = -low
         if flip:
-            m0, m1, m2, offset = -m0, -m1, -m2, near
+            m0, m1, m2, offset = -m0, -m1, -m2, high
         plane[row, count, 0] = m0
         plane[row, count, 1] = m1
         plane[row, count, 2] = m2
@@ -174,7 +174,7 @@ def clip_all(c: Polygons, slot: int, row: int, count: int) -> int:
 
 
 @inlined_kernel
-def beyond(g: Geometry, k: int, plane: Floats, row: int, count: int) -> int:
+def reaches_beyond(g: PortalArrays, k: int, plane: Floats, row: int, count: int) -> int:
     """WHOLE if portal k reaches beyond every plane of a row, else EMPTY or NEAR_TIE."""
     point, slack = g.point, g.slack
     c0, c1, c2, radius = g.ball[k, 0], g.ball[k, 1], g.ball[k, 2], g.ball[k, 3]

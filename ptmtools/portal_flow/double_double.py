@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bits, Ints
-from ptmtools.portal_flow.storage import DDPortals, DDScratch, Geometry, Scratch
+from ptmtools.portal_flow.storage import DDPortals, DDScratch, PortalArrays, Scratch
 from ptmtools.tolerance import Tolerance
 
 #: Vertices that clipping may add to a portal before it is left unclipped.
@@ -26,7 +26,7 @@ GROWTH = 72
 class SequenceTest:
     """Tests sequences of portals. Not to be shared between threads."""
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: PortalArrays) -> None:
         self._geometry = geometry
         self._portals = DDPortals(
             np.zeros(geometry.point.shape, complex), geometry.start, geometry.normal
@@ -85,7 +85,7 @@ DECIDED = 64
 COSTLIEST = 3
 
 
-class Searched(NamedTuple):
+class SearchCost(NamedTuple):
     """The cost of a search, summed over all repetitions except ``cut`` and ``ties``: see `Pvs`."""
 
     cut: bool
@@ -95,9 +95,15 @@ class Searched(NamedTuple):
     opened: int
 
 
-def searched(
-    g: Geometry, s: Scratch, test: SequenceTest, known: Bits, source: int, budget: int, seen: Bits
-) -> Searched:
+def search(
+    g: PortalArrays,
+    s: Scratch,
+    test: SequenceTest,
+    known: Bits,
+    source: int,
+    budget: int,
+    seen: Bits,
+) -> SearchCost:
     """Adds to the row ``seen`` (W,), zeroed or with what is seen already, what a directed portal
     sees; the arguments are those of `flow_kernels.flow`."""
     from ptmtools.portal_flow import flow_kernels as kernels
@@ -107,27 +113,27 @@ def searched(
     rejected = set(noted := _sequences(s.near_tie[:used]))
     overflown = len(noted) < ties
     if not (overflown or _deciding(known, known[source] & ~seen, rejected)):
-        return Searched(cut, work, ties, 0, 0)
+        return SearchCost(cut, work, ties, 0, 0)
     # Searches again with all of them accepted, for the portals not seen yet.
-    most = seen.copy()
-    more, loosely, _, _ = kernels.flow(g, s, known, source, budget, none, True, most)
+    loose = seen.copy()
+    more, loosely, _, _ = kernels.flow(g, s, known, source, budget, none, True, loose)
     work += more
     passes: dict[tuple[int, ...], bool] = {}
     while not (cut or loosely or overflown) and work < COSTLIEST * budget:
-        new = _deciding(known, most & ~seen, rejected - passes.keys())
+        new = _deciding(known, loose & ~seen, rejected - passes.keys())
         if len(passes) + len(new) > DECIDED:
             break
         for sequence in new:
             passes[sequence] = test.passes((source, *sequence))
         if not any(passes[sequence] for sequence in new):
-            return Searched(False, work, ties, len(passes), sum(passes.values()))
+            return SearchCost(False, work, ties, len(passes), sum(passes.values()))
         opened = np.sort(np.array([_mark(way) for way, open_ in passes.items() if open_]))
         more, cut, near, used = kernels.flow(g, s, known, source, budget, opened, False, seen)
         work, ties = work + more, max(ties, near)
         rejected = set(noted := _sequences(s.near_tie[:used]))
         overflown = len(noted) < near
-    seen |= most
-    return Searched(True, work, ties, len(passes), sum(passes.values()))
+    seen |= loose
+    return SearchCost(True, work, ties, len(passes), sum(passes.values()))
 
 
 def _mark(sequence: tuple[int, ...]) -> np.uint64:

@@ -68,7 +68,7 @@ def two_product(a: float, b: float) -> complex:
 
 
 @kernel
-def added(a: complex, b: complex) -> complex:
+def add(a: complex, b: complex) -> complex:
     """a + b, to 2⁻¹⁰⁴ of |a| + |b|."""
     s, t = two_sum(a.real, b.real), two_sum(a.imag, b.imag)
     s = two_sum(s.real, s.imag + t.real)
@@ -78,7 +78,7 @@ def added(a: complex, b: complex) -> complex:
 @kernel
 def less(a: complex, b: complex) -> complex:
     """a - b."""
-    return added(a, -b)
+    return add(a, -b)
 
 
 @kernel
@@ -89,18 +89,18 @@ def times(a: complex, b: complex) -> complex:
 
 
 @kernel
-def scaled(a: complex, b: float) -> complex:
+def scale_by(a: complex, b: float) -> complex:
     """a · b, to 2⁻¹⁰² of it."""
     return times(a, complex(b, 0.0))
 
 
 @kernel
-def over(a: complex, b: complex) -> complex:
+def divide(a: complex, b: complex) -> complex:
     """a / b, to 2⁻¹⁰⁰ of it."""
     first = a.real / b.real
-    rest = less(a, scaled(b, first))
+    rest = less(a, scale_by(b, first))
     second = rest.real / b.real
-    rest = less(rest, scaled(b, second))
+    rest = less(rest, scale_by(b, second))
     s = two_sum(first, second)
     return two_sum(s.real, s.imag + rest.real / b.real)
 
@@ -116,7 +116,7 @@ def side(s: DDScratch, row: int, i: int, slot: int, k: int) -> complex:
     """n·x + d of plane i of a row and vertex k of a polygon."""
     total: complex = s.plane[row, i, 3]
     for a in range(3):
-        total = added(total, times(s.plane[row, i, a], s.polygon[slot, k, a]))
+        total = add(total, times(s.plane[row, i, a], s.polygon[slot, k, a]))
     return total
 
 
@@ -145,10 +145,10 @@ def clip(s: DDScratch, row: int, count: int, slot: int) -> bool:
                     polygon[SPARE, m, a] = polygon[slot, k, a]
                 m += 1
             if (d.real > 0 and e.real < 0) or (d.real < 0 and e.real > 0):
-                share = over(d, less(d, e))
+                share = divide(d, less(d, e))
                 for a in range(3):
                     x = polygon[slot, k, a]
-                    polygon[SPARE, m, a] = added(x, times(share, less(polygon[slot, j, a], x)))
+                    polygon[SPARE, m, a] = add(x, times(share, less(polygon[slot, j, a], x)))
                 m += 1
         move(s, SPARE, slot, m)
     return True
@@ -199,30 +199,30 @@ def separators_through(
             continue
         for c in range(3):
             c1, c2 = (c + 1) % 3, (c + 2) % 3
-            x = scaled(edge[c1], g.normal[k, c2] / length)
-            outward[c] = less(x, scaled(edge[c2], g.normal[k, c1] / length))
+            x = scale_by(edge[c1], g.normal[k, c2] / length)
+            outward[c] = less(x, scale_by(edge[c2], g.normal[k, c1] / length))
         turn = complex(-np.inf, 0.0)
         for m in range(s.size[b]):
             u = v = complex(0.0, 0.0)
             for c in range(3):
                 r = less(polygon[b, m, c], polygon[a, i, c])
-                u = added(u, times(outward[c], r))
-                v = added(v, scaled(r, sign * g.normal[k, c]))
+                u = add(u, times(outward[c], r))
+                v = add(v, scale_by(r, sign * g.normal[k, c]))
             if v.real > ERROR:
                 rough = -u.real / v.real
                 if rough + ROUGHLY * (1.0 + abs(rough)) < turn.real:
                     continue
                 # Moved further, so that the vertex is SLACK beyond the plane.
                 more = SLACK * np.sqrt(1.0 + rough * rough) / v.real
-                t = added(over(-u, v), complex(more, 0.0))
+                t = add(divide(-u, v), complex(more, 0.0))
                 if greater(t, turn):
                     turn = t
         if turn.real == -np.inf:
             continue
         scale = 1.0 / np.sqrt(1.0 + turn.real * turn.real)
         for c in range(3):
-            x = added(outward[c], scaled(turn, sign * g.normal[k, c]))
-            plane[row, count, c] = scaled(x, scale)
+            x = add(outward[c], scale_by(turn, sign * g.normal[k, c]))
+            plane[row, count, c] = scale_by(x, scale)
         plane[row, count, 3] = 0.0
         before, beyond = complex(-np.inf, 0.0), complex(np.inf, 0.0)
         for m in range(s.size[a]):
@@ -240,7 +240,7 @@ def separators_through(
             for c in range(3):
                 plane[row, count, c] = -plane[row, count, c]
             offset = before
-        plane[row, count, 3] = added(offset, complex(SLACK, 0.0))
+        plane[row, count, 3] = add(offset, complex(SLACK, 0.0))
         count += 1
     return count
 

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.executor import Executor
-from ptmtools.portal_flow.double_double import Searched, SequenceTest, searched
-from ptmtools.portal_flow.storage import Geometry, Polygons, Scratch
+from ptmtools.portal_flow.double_double import SearchCost, SequenceTest, search
+from ptmtools.portal_flow.storage import Polygons, PortalArrays, Scratch
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
 
@@ -117,7 +117,7 @@ def portal_flow(
 
     g = geometry(portals)
     together = BATCH // 8
-    answered = open_question.answered(portals) if open_question else None
+    answered = open_question.answers(portals) if open_question else None
     searching = Searching(g, known, budget, answered)
     sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
     order = np.argsort(sizes, kind="stable")
@@ -168,7 +168,7 @@ def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:
     return matrix
 
 
-def _prepass(g: Geometry, executor: Executor) -> Bits:
+def _prepass(g: PortalArrays, executor: Executor) -> Bits:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods.
 
     The rounds of bits take a hundredth of the time of the floods: they are not distributed.
@@ -212,7 +212,7 @@ def check(portals: Portals) -> None:
         )
 
 
-def geometry(portals: Portals) -> Geometry:
+def geometry(portals: Portals) -> PortalArrays:
     """The portals in the form of the kernels: centred, counter-clockwise, with bounds."""
     start = portals.start.astype(np.int64)
     sizes = np.diff(start)
@@ -238,7 +238,7 @@ def geometry(portals: Portals) -> Geometry:
     out = np.argsort(leaves, kind="stable")
     tolerance = portals.tolerance or Tolerance.for_points(point)
     radius = np.maximum.reduceat(reach, start[:-1]) + tolerance.rounding
-    return Geometry(
+    return PortalArrays(
         point=np.ascontiguousarray(point),
         start=start,
         normal=np.ascontiguousarray(normal),
@@ -262,7 +262,7 @@ NEAR_TIE_WORDS = 1 << 16
 Tools = tuple[Scratch, SequenceTest]
 #: (G, W) for each group of leaves, the directed portals into leaves that it need not be tested
 #: against, as bits; and (2K,) the group of the leaf behind each directed portal.
-Answered = tuple[Bits, Ints]
+Answers = tuple[Bits, Ints]
 
 
 @dataclass(frozen=True)
@@ -272,8 +272,8 @@ class OpenQuestion:
     group: Ints  # (L,) the group of each leaf, from 0
     pairs: Bools  # (G, G) the pairs of groups that are not known to see each other
 
-    def answered(self, portals: Portals) -> Answered:
-        """See `Answered`."""
+    def answers(self, portals: Portals) -> Answers:
+        """See `Answers`."""
         enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
         rows = np.zeros((len(self.pairs), (len(enters) + 63) // 64), dtype=np.uint64)
         behind = self.group[enters]
@@ -288,7 +288,7 @@ class Searching:
     search, see `portal_flow`."""
 
     def __init__(
-        self, geometry: Geometry, known: Bits, budget: int, answered: Answered | None = None
+        self, geometry: PortalArrays, known: Bits, budget: int, answered: Answers | None = None
     ) -> None:
         self.geometry, self.known, self.budget = geometry, known, budget
         self._answered = answered
@@ -334,15 +334,15 @@ def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
     return rows
 
 
-def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
+def search_from(shared: Searching, source: int) -> tuple[Bits, SearchCost]:
     """As a task: a (W,) row of bits, the portals that the directed portal ``source`` sees; and the
     cost."""
     seen = shared.row(source)
     if (seen == shared.known[source]).all():
-        return seen, Searched(False, 0, 0, 0, 0)
+        return seen, SearchCost(False, 0, 0, 0, 0)
     with shared.tools() as (storage, test):
         given = shared.geometry, storage, test, shared.known, source, shared.budget
-        return seen, searched(*given, seen)
+        return seen, search(*given, seen)
 
 
 def settle(shared: Searching, batch: Ints, seen: Bits) -> None:
@@ -355,7 +355,7 @@ def settle(shared: Searching, batch: Ints, seen: Bits) -> None:
         drop_unreturned(shared.known, p, row)
 
 
-def scratch(g: Geometry, words: int) -> Scratch:
+def scratch(g: PortalArrays, words: int) -> Scratch:
     """Working storage for one worker."""
 
     depth = min(DEPTH, len(g.leaf) + 1)

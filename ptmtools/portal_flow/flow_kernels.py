@@ -20,15 +20,15 @@ from ptmtools.portal_flow.clipping_kernels import (
     EMPTY,
     NEAR_TIE,
     WHOLE,
-    beyond,
     clip,
     clip_all,
     copy,
     load,
+    reaches_beyond,
     separate,
 )
 from ptmtools.portal_flow.line_kernels import ONE, ZERO, glance, has, lowest
-from ptmtools.portal_flow.storage import Geometry, Scratch
+from ptmtools.portal_flow.storage import PortalArrays, Scratch
 
 #: Operations after which a search glances, which costs about as much again.
 GLANCE_AFTER = 12_500
@@ -57,7 +57,7 @@ def mark(sequence: Ints, first: int, count: int) -> np.uint64:
 
 
 @plain_kernel
-def settled(s: Scratch, opened: Bits, lenient: bool, frame: int, q: int, status: int) -> int:
+def settle_status(s: Scratch, opened: Bits, lenient: bool, frame: int, q: int, status: int) -> int:
     """The status of a clip; NEAR_TIE becomes WHOLE if ``lenient``, or if the sequence of portals
     that led into the frame, and q, is among the ``opened`` ones, ascending `mark`s."""
     if status != NEAR_TIE or lenient:
@@ -80,7 +80,7 @@ def settled(s: Scratch, opened: Bits, lenient: bool, frame: int, q: int, status:
 
 @plain_kernel
 def thin_out(
-    g: Geometry, s: Scratch, opened: Bits, lenient: bool, frame: int, seen: Bits, used: int
+    g: PortalArrays, s: Scratch, opened: Bits, lenient: bool, frame: int, seen: Bits, used: int
 ) -> tuple[bool, int, int, int]:
     """Drops from a frame's possible portals the unseen ones that its separators hide.
 
@@ -88,29 +88,29 @@ def thin_out(
     of `Scratch.near_tie` used).
     """
     might, plane, count = s.might, s.polygons.plane, s.planes[frame]
-    left = False
+    remains = False
     tested = ties = 0
     for w in range(might.shape[1]):
         rest = might[frame, w] & ~seen[w]
         while rest != ZERO:
             q = (w << 6) + lowest(rest)
             tested += 1
-            now = beyond(g, q >> 1, plane, frame, count)
-            now = settled(s, opened, lenient, frame, q, now)
+            now = reaches_beyond(g, q >> 1, plane, frame, count)
+            now = settle_status(s, opened, lenient, frame, q, now)
             if now == WHOLE:
-                left = True
+                remains = True
             else:
                 might[frame, w] &= ~(ONE << np.uint64(q & 63))
                 if now == NEAR_TIE:
                     ties += 1
                     used = record(s, used, frame, q)
             rest &= rest - ONE
-    return left, tested, ties, used
+    return remains, tested, ties, used
 
 
 @plain_kernel
 def flow(
-    g: Geometry,
+    g: PortalArrays,
     s: Scratch,
     known: Bits,
     source: int,
@@ -180,7 +180,7 @@ def flow(
         sq = 1.0 if q & 1 == 0 else -1.0
         a, b = 2 * child, 2 * child + 1
         load(c, b, g.point, g.start, k)
-        now = settled(s, opened, lenient, f, q, clip(c, b, facing))
+        now = settle_status(s, opened, lenient, f, q, clip(c, b, facing))
         for i in range(planes[f]):
             if now <= EMPTY:
                 break
@@ -188,25 +188,25 @@ def flow(
             if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] + d >= ball[k, 3]:
                 continue
             ops += 1
-            now = settled(s, opened, lenient, f, q, clip(c, b, (n0, n1, n2, d)))
+            now = settle_status(s, opened, lenient, f, q, clip(c, b, (n0, n1, n2, d)))
         status = now
         if now > EMPTY:
             copy(c, 2 * f, a, c.size[2 * f])
             ops += 1
             n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
             before = g.high[k] if q & 1 == 0 else -g.low[k]
-            now = settled(s, opened, lenient, f, q, clip(c, a, (n0, n1, n2, before)))
+            now = settle_status(s, opened, lenient, f, q, clip(c, a, (n0, n1, n2, before)))
             status = now
         if now > EMPTY and f > 0:
             passed, last = 2 * f + 1, via[f]
             if status == CUT:
                 n = separate(c, normal, a, source, passed, last ^ 1, depth)
                 ops += n + 1
-                now = settled(s, opened, lenient, f, q, clip_all(c, b, depth, n))
+                now = settle_status(s, opened, lenient, f, q, clip_all(c, b, depth, n))
             if now > EMPTY:
                 n = separate(c, normal, b, q ^ 1, passed, last, depth)
                 ops += n + 1
-                now = settled(s, opened, lenient, f, q, clip_all(c, a, depth, n))
+                now = settle_status(s, opened, lenient, f, q, clip_all(c, a, depth, n))
         if now <= EMPTY:
             if now == NEAR_TIE:
                 ties += 1
@@ -221,10 +221,10 @@ def flow(
             row = child
             planes[child] = separate(c, normal, a, source, b, q ^ 1, child)
             via[child] = q
-            left, tested, near, used = thin_out(g, s, opened, lenient, child, seen, used)
+            remains, tested, near, used = thin_out(g, s, opened, lenient, child, seen, used)
             ops += 1 + (tested >> 3)
             ties += near
-            if not left:
+            if not remains:
                 continue
         if not room or ops >= budget:
             # Without room the frame's own set stands in for the child's.
@@ -238,7 +238,7 @@ def flow(
 
 
 @plain_kernel
-def reaches(g: Geometry, k: int, n: Floats, s: float, floor: float) -> bool:
+def reaches(g: PortalArrays, k: int, n: Floats, s: float, floor: float) -> bool:
     """Whether portal k has a point with s · n·x > floor."""
     ball = g.ball
     middle = s * (n[0] * ball[k, 0] + n[1] * ball[k, 1] + n[2] * ball[k, 2])
@@ -253,7 +253,7 @@ def reaches(g: Geometry, k: int, n: Floats, s: float, floor: float) -> bool:
 
 
 @plain_kernel
-def ahead(g: Geometry, p: int, q: int) -> bool:
+def ahead(g: PortalArrays, p: int, q: int) -> bool:
     """Whether a straight line may cross directed portal p and then q, by their planes alone:
     something of q lies beyond p's plane, and something of p before q's."""
     k, j = p >> 1, q >> 1
@@ -269,7 +269,7 @@ def ahead(g: Geometry, p: int, q: int) -> bool:
 
 
 @kernel
-def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
+def flood(g: PortalArrays, s: Scratch, first: int, last: int, rows: Bits) -> None:
     """Fills ``rows`` (last - first, W), zeroed, with the portals that floods from first … last - 1
     reach.
 
@@ -306,14 +306,14 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
                     if facing[q] < 0 or not ahead(g, before, q):
                         continue
                     visited[q] = wave  # portals that the planes hide are hidden on every path
-                    if beyond(g, q >> 1, s.polygons.plane, 0, count) != EMPTY:
+                    if reaches_beyond(g, q >> 1, s.polygons.plane, 0, count) != EMPTY:
                         rows[p - first, q >> 6] |= ONE << np.uint64(q & 63)
                         stack[top] = q
                         top += 1
 
 
 @kernel
-def tighten(g: Geometry, first: int, last: int, known: Bits, tighter: Bits) -> None:
+def tighten(g: PortalArrays, first: int, last: int, known: Bits, tighter: Bits) -> None:
     """Fills rows first … last - 1 of ``tighter``: the portals that p may see by ``known`` and that
     are, or may be seen by, some q behind p's next leaf."""
     words = known.shape[1]

@@ -21,7 +21,7 @@ import numpy as np
 
 from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.jit import kernel, plain_kernel
-from ptmtools.portal_flow.storage import Geometry
+from ptmtools.portal_flow.storage import PortalArrays
 
 
 class Openings(NamedTuple):
@@ -66,11 +66,11 @@ def follow(
     from ``steps`` on, at most half of its length, and returns how many it then has."""
     end = steps + len(path) // 2
     while steps < end:
-        here = openings.leaf[q]
-        path[steps] = here
+        leaf = openings.leaf[q]
+        path[steps] = leaf
         steps += 1
         q = -1
-        for i in range(openings.out_start[here], openings.out_start[here + 1]):
+        for i in range(openings.out_start[leaf], openings.out_start[leaf + 1]):
             if passes(openings.point, openings.start, openings.out[i], origin, along, turn):
                 q = openings.out[i]
                 break
@@ -186,7 +186,7 @@ def draw(state: np.uint64) -> tuple[np.uint64, float]:
 
 
 @plain_kernel
-def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
+def place_in(g: PortalArrays, k: int, state: np.uint64, at: Floats) -> np.uint64:
     """Puts a random point of portal k into ``at`` (3,); returns the generator's next state."""
     first, count = g.start[k], g.start[k + 1] - g.start[k]
     state, r = draw(state)
@@ -203,7 +203,7 @@ def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
 
 
 @plain_kernel
-def glance(g: Geometry, known: Bits, source: int, seen: Bits, line: Floats) -> int:
+def glance(g: PortalArrays, known: Bits, source: int, seen: Bits, line: Floats) -> int:
     """Marks in ``seen`` (W,) the portals that one random line to each possible portal crosses.
 
     A marked portal is certainly seen, so the search need not test it; a line that rounding leads

@@ -12,7 +12,7 @@ from ptmtools.arrays import Bits, Floats, Ints
 Doubles = NDArray[np.complex128]
 
 
-class Geometry(NamedTuple):
+class PortalArrays(NamedTuple):
     """Portals ready for the kernels; `flow.geometry` fills it."""
 
     point: Floats  # (Q, 3) centred on the scene

@@ -46,7 +46,7 @@ def show_relief(
         color=np.ones_like(surfaces.color),
         clamped=np.ones_like(surfaces.clamped),
     )
-    value = _sampled(sight, maps, shows, loaded, column)
+    value = _sample_maps(sight, maps, shows, loaded, column)
     face = sight.triangle[relieved]
     axes = frame_axes(relief.frame[face])
     normal = np.einsum("nij,nj->ni", axes, value[relieved] / 127.5 - 1)
@@ -66,7 +66,7 @@ def show_bumps(
     if not len(bumped):
         return
     triangles = triangles_of(maps)
-    value = _sampled(sight, maps, shows, loaded, column)[bumped] / 127.5 - 1
+    value = _sample_maps(sight, maps, shows, loaded, column)[bumped] / 127.5 - 1
     face, ray = sight.triangle[bumped], sight.ray[bumped]
     normal = triangles.normal[face]
     facing = np.einsum("ij,ij->i", normal, ray)
@@ -96,7 +96,7 @@ def _with_map(
     return some[present]
 
 
-def _sampled(sight: Sight, maps: Surfaces, shows: Shows, loaded: Bools, column: Ints) -> Floats:
+def _sample_maps(sight: Sight, maps: Surfaces, shows: Shows, loaded: Bools, column: Ints) -> Floats:
     """(n, 3) texels of surfaces with maps as textures, 0 to 255."""
     value = np.empty((len(sight.ray), 3))
     shade(sight, triangles_of(maps), shows, loaded, column, value)

@@ -20,7 +20,7 @@ def to_srgb(light: Floats) -> Floats:
     return np.where(clipped <= 0.0031308, 12.92 * clipped, bright)
 
 
-def encoded(light: Floats) -> NDArray[np.uint8]:
+def encode_srgb(light: Floats) -> NDArray[np.uint8]:
     """Linear light as sRGB bytes."""
     return np.rint(255 * to_srgb(light)).astype(np.uint8)
 
@@ -36,14 +36,14 @@ def luminance(light: Floats) -> Floats:
     return np.asarray(light @ np.array([0.2126, 0.7152, 0.0722]))
 
 
-def packed(colors: NDArray[np.uint8]) -> NDArray[np.int64]:
+def pack_colors(colors: NDArray[np.uint8]) -> NDArray[np.int64]:
     """(...,) one number for each of (..., 3) colours."""
     red, green, blue = np.moveaxis(colors.astype(np.int64), -1, 0)
     return np.asarray(red << 16 | green << 8 | blue)
 
 
-def unpacked(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """The inverse of `packed`."""
+def unpack_colors(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """The inverse of `pack_colors`."""
     return np.stack([numbers >> 16, numbers >> 8, numbers], axis=-1).astype(np.uint8)
 
 

@@ -35,7 +35,7 @@ from ptmtools.scene.orientation.main_axes import tolerance_of
 from ptmtools.scene.orientation.space import (
     DeclaredSpace,
     parse_unit,
-    rotated,
+    rotate,
     settle,
     to_world,
 )
@@ -184,7 +184,7 @@ def find_space(draft: Draft) -> None:
     """Settles unit and up axis. Raises as `settle`."""
     source, kept, row = draft.source, draft.kept, draft.format
     options = draft.options
-    named = NamedFaces.of(
+    named = NamedFaces.from_names(
         (source.objects, source.triangle_object[kept.source]),
         ([material.name for material in source.materials], source.triangle_material[kept.source]),
     )
@@ -327,5 +327,5 @@ def _storeys(source: ModelSource, space: Space) -> tuple[Storey, ...]:
 
 def _camera(camera: Camera, space: Space) -> Camera:
     position = to_world(np.array([camera.position]), space)[0].tolist()
-    direction = rotated(np.array([camera.direction]), space.up)[0].tolist()
+    direction = rotate(np.array([camera.direction]), space.up)[0].tolist()
     return Camera(camera.name, tuple(position), tuple(direction), camera.field_of_view)

@@ -116,9 +116,9 @@ def _guesses(scene: Scene, usual: Up | None) -> list[Guess]:
     other axis and with another unit."""
     space = scene.space
     points = scene.points / space.metres
-    if space.up == "z":  # the inverse of `space.rotated`
+    if space.up == "z":  # the inverse of `space.rotate`
         points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
-    named = NamedFaces.of(
+    named = NamedFaces.from_names(
         (scene.objects, scene.triangle_object),
         ([material.name for material in scene.materials], scene.triangle_material),
     )

@@ -22,7 +22,7 @@ from ptmtools.scene.images import ImageStore, integers, read_within
 from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.orientation.space import rotated, to_world
+from ptmtools.scene.orientation.space import rotate, to_world
 from ptmtools.scene.source import ModelSource, SecondReading, SourceMaterial, SourceTexture
 from ptmtools.texture.model import Limits
 
@@ -80,11 +80,11 @@ class LightImages:
         note, for others."""
         from ptmtools.texture.images.files import load_image
 
-        def checked(data: bytes, limit: int) -> bytes:
+        def check(data: bytes, limit: int) -> bytes:
             load_image(data, Limits(limit)).array()
             return self._held.setdefault(data, data)
 
-        return self._read(texture, self._maps, checked)
+        return self._read(texture, self._maps, check)
 
     def _read(
         self,
@@ -124,7 +124,7 @@ def _mean(data: bytes, limit: int) -> float:
 
 def _place(lamp: Lamp, space: Space) -> Lamp:
     x, y, z = to_world(np.array([lamp.position]), space)[0].tolist()
-    dx, dy, dz = rotated(np.array([lamp.direction]), space.up)[0].tolist()
+    dx, dy, dz = rotate(np.array([lamp.direction]), space.up)[0].tolist()
     return replace(lamp, position=(x, y, z), direction=(dx, dy, dz))
 
 

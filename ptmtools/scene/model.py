@@ -170,9 +170,9 @@ class RoomVolume:
     points: NDArray[np.float64]
     triangles: NDArray[np.int32]
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, RoomVolume) and all(
-            map(np.array_equal, vars(self).values(), vars(other).values())
+    def __eq__(self, value: object) -> bool:
+        return isinstance(value, RoomVolume) and all(
+            map(np.array_equal, vars(self).values(), vars(value).values())
         )
 
 

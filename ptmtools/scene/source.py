@@ -266,9 +266,9 @@ class MeshArrays:
         copies[mirrored] = copies[mirrored][..., ::-1]  # mirroring reverses the winding
         self.points.append(placed.reshape(-1, 3))
         self.triangles.append(copies.reshape(-1, 3))
-        self.uv.append(_repeated(uv, k, mirrored))
-        self.colors.append(None if colors is None else _repeated(colors, k, mirrored))
-        self.normal_uv.append(None if normal_uv is None else _repeated(normal_uv, k, mirrored))
+        self.uv.append(_repeat(uv, k, mirrored))
+        self.colors.append(None if colors is None else _repeat(colors, k, mirrored))
+        self.normal_uv.append(None if normal_uv is None else _repeat(normal_uv, k, mirrored))
         self.object.append(np.repeat(first_object + np.arange(k), t))
         self.material.append(np.tile(np.broadcast_to(material, t), k))
         self.count += k * p
@@ -305,7 +305,7 @@ class MeshArrays:
         )
 
 
-def _repeated(values: NDArray[Any], times: int, mirrored: NDArray[np.bool_]) -> NDArray[Any]:
+def _repeat(values: NDArray[Any], times: int, mirrored: NDArray[np.bool_]) -> NDArray[Any]:
     """(times · t, 3, m) values of corners, in reverse order for mirrored instances."""
     copies = np.broadcast_to(values, (times, *values.shape)).copy()
     copies[mirrored] = copies[mirrored][..., ::-1, :]

@@ -69,7 +69,7 @@ def uses_holes(
     inside = np.zeros(len(box), dtype=np.int64)
     for sign_x, x in ((-1, box[:, 0]), (1, box[:, 2])):
         for sign_y, y in ((-1, box[:, 1]), (1, box[:, 3])):
-            inside += sign_x * sign_y * _up_to(table, x, y)
+            inside += sign_x * sign_y * _count_holes(table, x, y)
     if (smeared & (inside > 0)).any():
         return True
     candidates = np.flatnonzero(inside)
@@ -91,7 +91,7 @@ def _table(holes: NDArray[np.bool_]) -> NDArray[np.uint32]:
     return table
 
 
-def _up_to(
+def _count_holes(
     table: NDArray[np.uint32], x: NDArray[np.int64], y: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Holes in [0, x) × [0, y) of the plane tiled with the image."""
@@ -143,7 +143,7 @@ def _touches(
     reached &= end > first
     row = rows[reached] % height
 
-    def before(column: NDArray[np.int64]) -> NDArray[np.int64]:
+    def holes_before(column: NDArray[np.int64]) -> NDArray[np.int64]:
         """Holes of each row to the left of a column of the tiled plane."""
         tiles, rest = np.divmod(column, width)
         whole = table[row + 1, -1].astype(np.int64) - table[row, -1]
@@ -151,4 +151,4 @@ def _touches(
         count: NDArray[np.int64] = tiles * whole + part
         return count
 
-    return bool((before(end[reached]) > before(first[reached])).any())
+    return bool((holes_before(end[reached]) > holes_before(first[reached])).any())

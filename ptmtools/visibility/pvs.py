@@ -28,7 +28,7 @@ from ptmtools.portal_flow.flow import (
     portal_flow,
     upper_bound,
 )
-from ptmtools.portal_flow.storage import Geometry
+from ptmtools.portal_flow.storage import PortalArrays
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
@@ -40,7 +40,7 @@ SPANS = 64
 
 
 #: Shared data of the tasks: portals, number of leaves, lines through each portal, and the seed.
-Shooting = tuple[Geometry, int, int, int]
+Shooting = tuple[PortalArrays, int, int, int]
 
 
 def sampled_leaves(
@@ -66,8 +66,8 @@ def sampled_leaves(
     spans = [(first, min(first + step, count)) for first in range(0, count, step)]
     for bits in executor.each(_shoot, shooting, spans, releases_lock=True):
         matrix |= np.unpackbits(bits, axis=1, count=leaves).astype(np.bool_)
-    one, other = portals.leaf.T
-    matrix[one, other] = matrix[other, one] = True
+    a, b = portals.leaf.T
+    matrix[a, b] = matrix[b, a] = True
     return matrix
 
 
@@ -94,7 +94,7 @@ def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
     return np.packbits(seen, axis=1)
 
 
-def _points(rng: np.random.Generator, g: Geometry, portal: Ints) -> Floats:
+def _points(rng: np.random.Generator, g: PortalArrays, portal: Ints) -> Floats:
     """(n, 3) a random point of each of (n,) portals, in a random triangle of its fan."""
     first, size = g.start[portal], np.diff(g.start)[portal]
     corner = 1 + rng.integers(np.maximum(size - 2, 1))
@@ -171,24 +171,24 @@ def compute_pvs(
     volumes = {"volume": cells.cell_volumes(), "standing": cells.cell_volumes(standing=True)}
     if options.method == "sampled":
         leaves = sampled_leaves(portals, options.lines, executor)
-        return Pvs.from_matrix(lifted(cells, leaves), **volumes, conservative=False)
+        return Pvs.from_matrix(lift_to_cells(cells, leaves), **volumes, conservative=False)
     budget = options.budget if options.method == "full" else 0
     question, bound, spared = None, None, 0.0
     reports_cut = options.method == "full"
     if budget and MANY_PORTALS <= len(portals.leaf) <= MOST_PORTALS:
-        lines = lifted(cells, sampled_leaves(portals, FIRST_LINES, executor))
+        lines = lift_to_cells(cells, sampled_leaves(portals, FIRST_LINES, executor))
         least = Pvs.from_matrix(lines, **volumes).volume_at_hand[0]
         if 1 - least <= options.gain > 0:  # all cells are bound enough
             return Pvs.from_matrix(np.ones_like(lines), spared=max(1 - least, 0.0), **volumes)
         bound = upper_bound(portals, executor)
-        most = lifted(cells, leaf_matrix(portals, bound))
-        spared = 1 - least / Pvs.from_matrix(most, **volumes).volume_at_hand[0]
+        bound_matrix = lift_to_cells(cells, leaf_matrix(portals, bound))
+        spared = 1 - least / Pvs.from_matrix(bound_matrix, **volumes).volume_at_hand[0]
         if spared <= options.gain:
             budget, reports_cut = 0, False
         else:
             question, spared = _open_question(cells, lines), 0.0
     flow = portal_flow(portals, budget, progress, executor, question, bound)
-    matrix = lifted(cells, leaf_matrix(portals, flow))
+    matrix = lift_to_cells(cells, leaf_matrix(portals, flow))
     return Pvs.from_matrix(
         matrix,
         spared=spared,
@@ -211,7 +211,7 @@ def _open_question(cells: Cells, lines: Bools) -> OpenQuestion:
     return OpenQuestion(group, pairs)
 
 
-def lifted(cells: Cells, leaves: Bools) -> Bools:
+def lift_to_cells(cells: Cells, leaves: Bools) -> Bools:
     """(C, C) from (L, L): a cell sees the cells seen from its standing leaves, symmetrically."""
     order = np.argsort(cells.leaf_cell, kind="stable")
     order = order[cells.leaf_cell[order] >= 0]
@@ -221,7 +221,7 @@ def lifted(cells: Cells, leaves: Bools) -> Bools:
     if cells.cell_count:
         by_row = np.logical_or.reduceat(sees, first, axis=0)
         matrix = np.logical_or.reduceat(by_row[:, order], first, axis=1)
-    one, other = cells.portal_cell[: cells.sight_count].T
-    kept = (one >= 0) & (other >= 0)
-    matrix[one[kept], other[kept]] = matrix[other[kept], one[kept]] = True
+    a, b = cells.portal_cell[: cells.sight_count].T
+    kept = (a >= 0) & (b >= 0)
+    matrix[a[kept], b[kept]] = matrix[b[kept], a[kept]] = True
     return matrix

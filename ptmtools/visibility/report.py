@@ -179,8 +179,8 @@ def _share(share: float, sees: int) -> str:
     return f"{share:.0%} of cells ≤ {sees:,}"
 
 
-def _place(one: PortalFacts) -> str:
-    a, b = one.cells
+def _place(portal: PortalFacts) -> str:
+    a, b = portal.cells
     where = f"between cells {a} and {b}" if a != b else f"inside cell {a}"
-    at = ",".join(f"{c:.2f}" for c in one.centre)
-    return f"portal {one.portal} {where}, {one.area:.3g} m² at {at}"
+    at = ",".join(f"{c:.2f}" for c in portal.centre)
+    return f"portal {portal.portal} {where}, {portal.area:.3g} m² at {at}"

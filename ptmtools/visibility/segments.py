@@ -118,7 +118,6 @@ def check_conservative(
     visible[:-1, :-1] = pvs.to_matrix()
     draw, eyes = Sampler(cells), _Eyes(cells)
     blockers = Blockers(structural, cells.root_box)
-    jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
     pairs: dict[tuple[int, int], MissedPair] = {}
     while tried < segments and drawn < PATIENCE * segments:
@@ -133,27 +132,41 @@ def check_conservative(
             start, end = start[some], end[some]
         tried += len(start)
         a, b = cells.locate(start), cells.locate(end)
-        clear = ~blockers.between(start, end)
+        clear = ~blockers.block(start, end)
         unoccluded += int(clear.sum())
         missed = np.flatnonzero(clear & ~visible[a, b])
-        share = np.zeros(len(missed))
-        for _ in range(COPIES):
-            shift = rng.normal(size=(len(missed), 3))
-            shift *= jitter / np.linalg.norm(shift, axis=1, keepdims=True)
-            p, q = start[missed] + shift, end[missed] + shift
-            seen = visible[cells.locate(p), cells.locate(q)]
-            counts_as_miss = (cells.locate_leaf(p) >= 0) & (cells.locate_leaf(q) >= 0) & ~seen
-            counts_as_miss &= ~blockers.between(p, q)
-            share += counts_as_miss / COPIES
+        share = _missed_share(rng, cells, visible, blockers, start[missed], end[missed])
         hairlines += int((share < 0.5).sum())
         for m in missed[share >= 0.5]:
             ends = (int(a[m]), _place(start[m])), (int(b[m]), _place(end[m]))
-            (one, first_end), (other, second_end) = sorted(ends)
-            pair = pairs.get((one, other)) or MissedPair((one, other), first_end, second_end, 0)
-            pairs[one, other] = replace(pair, segments=pair.segments + 1)
+            (first, first_end), (second, second_end) = sorted(ends)
+            key = first, second
+            pair = pairs.get(key) or MissedPair(key, first_end, second_end, 0)
+            pairs[key] = replace(pair, segments=pair.segments + 1)
         progress(tried, segments, "segments")
     missing = tuple(pairs[pair] for pair in sorted(pairs))
     return SegmentReport(tried, unoccluded, missing, hairlines)
+
+
+def _missed_share(
+    rng: np.random.Generator,
+    cells: Cells,
+    visible: Bools,
+    blockers: Blockers,
+    start: Floats,
+    end: Floats,
+) -> Floats:
+    """(n,) the share of jittered copies of segments that nothing blocks, but the (C + 1, C + 1)
+    ``visible`` pairs of cells lack."""
+    jitter, share = JITTER * cells.tolerance.hairline, np.zeros(len(start))
+    for _ in range(COPIES):
+        shift = rng.normal(size=(len(start), 3))
+        shift *= jitter / np.linalg.norm(shift, axis=1, keepdims=True)
+        p, q = start + shift, end + shift
+        seen = visible[cells.locate(p), cells.locate(q)]
+        missed = (cells.locate_leaf(p) >= 0) & (cells.locate_leaf(q) >= 0) & ~seen
+        share += (missed & ~blockers.block(p, q)) / COPIES
+    return share
 
 
 class _Eyes:
@@ -164,7 +177,7 @@ class _Eyes:
     def __init__(self, cells: Cells) -> None:
         self._cells, self._eyes = cells, cells.eyes
         bodies = [cells.leaf_points(leaf) for leaf in range(cells.leaf_count)]
-        floored = [self._eyes.about(body.min(axis=0), body.max(axis=0)) for body in bodies]
+        floored = [self._eyes.is_near(body.min(axis=0), body.max(axis=0)) for body in bodies]
         self._whole = cells.leaf_standing & ~np.array(floored, dtype=np.bool_)
         passages = cells.portal_leaf[cells.portal_passage]
         self._doors = np.bincount(passages.ravel(), minlength=cells.leaf_count) > 1
@@ -176,7 +189,7 @@ class _Eyes:
                 thin[leaf] |= np.ptp(bodies[leaf] @ normal) <= THICK + cells.tolerance.plane
         self._doors &= thin
 
-    def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
+    def may_be_at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
         """(n,) whether an eye can be at the (n, 3) points, in (n,) leaves or -1."""
         inside = leaf >= 0
         standing = inside & self._whole[leaf]
@@ -188,9 +201,9 @@ class _Eyes:
     def first(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         """The segments between (n, 3) points that begin where an eye can be and end in a leaf;
         reversed if only the end is such a place."""
-        leaf, other = self._cells.locate_leaf(start), self._cells.locate_leaf(end)
-        eye = self.at(start, leaf)
-        kept = (leaf >= 0) & (other >= 0) & (eye | self.at(end, other))
+        leaf, end_leaf = self._cells.locate_leaf(start), self._cells.locate_leaf(end)
+        eye = self.may_be_at(start, leaf)
+        kept = (leaf >= 0) & (end_leaf >= 0) & (eye | self.may_be_at(end, end_leaf))
         start, end, turned = start[kept], end[kept], ~eye[kept, None]
         return np.where(turned, end, start), np.where(turned, start, end)
 
@@ -202,10 +215,10 @@ class Sampler:
         corners, leaf = cells.tetrahedra()
         volume = volumes(corners)
         self.by_volume = _Inside(corners, volume)
-        self.by_leaf = _Inside(corners, _shared(volume, leaf))
+        self.by_leaf = _Inside(corners, _shares(volume, leaf))
         rows, portal = fans(cells.portal_start)
         triangles = cells.portal_point[rows]
-        self.by_portal = _Inside(triangles, _shared(areas(triangles), portal))
+        self.by_portal = _Inside(triangles, _shares(areas(triangles), portal))
         self.extent = float(np.ptp(cells.root_box, axis=0).max())
 
     def segments(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
@@ -245,7 +258,7 @@ class _Inside:
         return mixed
 
 
-def _shared(size: Floats, owner: Ints) -> Floats:
+def _shares(size: Floats, owner: Ints) -> Floats:
     """(n,) sizes as shares of those of their owners."""
     total = np.bincount(owner, size)[owner]
     return size / np.maximum(total, np.finfo(np.float64).tiny)
@@ -266,7 +279,7 @@ class Blockers:
         local = (points - self._middle) * self._scale
         return np.ascontiguousarray(local, dtype=np.float32)
 
-    def between(self, start: Floats, end: Floats) -> Bools:
+    def block(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether a triangle blocks the segment between two (n, 3) points."""
         if self._scene is None or len(start) == 0:
             return np.zeros(len(start), dtype=np.bool_)

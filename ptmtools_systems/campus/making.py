@@ -20,7 +20,7 @@ from ptmtools.light.atlas import unwrap
 from ptmtools.light.lightmap import bake, vertex_light
 from ptmtools.light.looks import PaintedLight, RayLight, open_sides
 from ptmtools.light.occlusion import Occluders, normals
-from ptmtools.scene.colors import encoded, to_linear
+from ptmtools.scene.colors import encode_srgb, to_linear
 from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
 from ptmtools_systems.campus.meshes import Corners, mesh_bytes
 from ptmtools_systems.campus.model import (
@@ -126,7 +126,7 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         look = _look(work, faces, finest, lods[-1], side)
         maps = bake(look, finest, atlas, look.grain, LIGHT_SIZES)
         source = _light_source(work, faces)
-        texels = [(len(m.value), encoded(m.value.astype(np.float64)), source) for m in maps]
+        texels = [(len(m.value), encode_srgb(m.value.astype(np.float64)), source) for m in maps]
         lightmaps = light_files(name, texels, options.quality)
         covered, computed = sum(m.covered for m in maps), sum(m.computed for m in maps)
         if atlas.side != LIGHT_SIZES[0]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.scene.colors import encoded, packed, to_linear, to_srgb, unpacked
+from ptmtools.scene.colors import encode_srgb, pack_colors, to_linear, to_srgb, unpack_colors
 
 
 def test_what_the_standard_says() -> None:
@@ -16,12 +16,12 @@ def test_what_the_standard_says() -> None:
 
 def test_levels_come_back() -> None:
     levels = np.arange(256, dtype=np.uint8)
-    assert np.array_equal(encoded(to_linear(levels / 255)), levels)
+    assert np.array_equal(encode_srgb(to_linear(levels / 255)), levels)
     in_16_bits = np.rint(65535 * to_linear(levels / 255)) / 65535
-    assert np.array_equal(encoded(in_16_bits), levels)
+    assert np.array_equal(encode_srgb(in_16_bits), levels)
 
 
 def test_numbers_of_colors() -> None:
     colors = np.random.default_rng(1).integers(0, 256, (4, 5, 3), dtype=np.uint8)
-    assert np.array_equal(unpacked(packed(colors)), colors)
-    assert packed(np.array([1, 2, 3], np.uint8)) == 0x010203
+    assert np.array_equal(unpack_colors(pack_colors(colors)), colors)
+    assert pack_colors(np.array([1, 2, 3], np.uint8)) == 0x010203

@@ -33,7 +33,7 @@ def test_crossings(axis: int) -> None:
     points = random.normal(size=(24, 3))
     faces = random.permutation(np.repeat(np.arange(24), 2))[:45].reshape(15, 3)
     lines = SampleLines(points, faces)
-    actual = lines.along(axis)
+    actual = lines.crossings(axis)
     pairs = list(zip(actual.line.tolist(), actual.triangle.tolist(), strict=True))
     assert sorted(pairs) == one_by_one(lines, points[faces], axis)
     assert len(pairs) > 200
@@ -49,7 +49,7 @@ def test_crossings(axis: int) -> None:
 def test_areas_are_summed_up() -> None:
     """Of a meadow of 480 m well, and roughly of a house of 8 × 5 m in its middle, which is met."""
     points, faces = welded(meadow(box((0, 0, 0), (8, 5, 3))))
-    actual = SampleLines(points, faces).along(2)
+    actual = SampleLines(points, faces).crossings(2)
     ground = points[faces][actual.triangle][:, :, 2].max(axis=1) < 0
     assert actual.section[ground].sum() == pytest.approx(480**2, rel=0.05)
     assert 2 * 40 < actual.section[~ground].sum() < 0.01 * 480**2
@@ -57,7 +57,7 @@ def test_areas_are_summed_up() -> None:
 
 def test_dividing_triangles_changes_nothing() -> None:
     whole = turned_in_plan(house(), 20)
-    one, many = (SampleLines(*welded(each)).along(0) for each in (whole, divided(whole)))
+    one, many = (SampleLines(*welded(each)).crossings(0) for each in (whole, divided(whole)))
     assert one.section.sum() == pytest.approx(many.section.sum(), rel=0.1)
 
 
@@ -76,6 +76,6 @@ def test_a_heap_of_large_triangles_is_met_by_fewer_lines() -> None:
 def test_flat_and_tiny_models(axis: int) -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]])
-    actual = SampleLines(points, faces).along(axis)
+    actual = SampleLines(points, faces).crossings(axis)
     assert (len(actual.line) > 0) == (axis == 2)
-    assert len(SampleLines(points[:3] * 0, faces[:1]).along(axis).line) == 0
+    assert len(SampleLines(points[:3] * 0, faces[:1]).crossings(axis).line) == 0

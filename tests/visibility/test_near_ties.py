@@ -97,11 +97,11 @@ def test_arithmetic_is_as_precise_as_it_says(a, b, c, d):
     x, y = kernels.two_sum(a, b * 2.0**-53), kernels.two_sum(c, d * 2.0**-53)
     p, q = fraction(x), fraction(y)
     least = Fraction(2) ** -800  # products of low parts may underflow
-    assert abs(fraction(kernels.added(x, y)) - (p + q)) <= (abs(p) + abs(q)) / 2**104
+    assert abs(fraction(kernels.add(x, y)) - (p + q)) <= (abs(p) + abs(q)) / 2**104
     assert abs(fraction(kernels.less(x, y)) - (p - q)) <= (abs(p) + abs(q)) / 2**104
     assert abs(fraction(kernels.times(x, y)) - p * q) <= abs(p * q) / 2**102 + least
     if q != 0 and abs(p) < abs(q) * 2**200:
-        assert abs(fraction(kernels.over(x, y)) - p / q) <= abs(p / q) / 2**100 + least
+        assert abs(fraction(kernels.divide(x, y)) - p / q) <= abs(p / q) / 2**100 + least
     assert kernels.greater(x, y) == (p > q)
 
 

@@ -41,7 +41,7 @@ def test_a_row_of_rooms_passes_and_without_one_portal_fails(room_row, kept):
         ends = np.array([miss.start, miss.end])
         assert cells.locate(ends).tolist() == list(miss.cells)
         box = structural.reshape(-1, 3)
-        assert not Blockers(structural, box).between(ends[:1], ends[1:])[0]
+        assert not Blockers(structural, box).block(ends[:1], ends[1:])[0]
     assert report.missed_segments == sum(miss.segments for miss in report.missed)
 
 

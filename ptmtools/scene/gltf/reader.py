@@ -20,7 +20,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.glb import COMPONENTS, meaning, natural
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.colors import encoded
+from ptmtools.scene.colors import encode_srgb
 from ptmtools.scene.formats import MAX_VERTICES, Purpose, too_many_triangles
 from ptmtools.scene.gltf.compression import DRACO, DracoPrimitive, decode_primitives
 from ptmtools.scene.gltf.document import (
@@ -264,7 +264,7 @@ class _Values:
         return meaning(stored, bool(accessor.get("normalized")))
 
     @property
-    def decoded(self) -> bool:
+    def uses_draco(self) -> bool:
         """Whether the primitive was compressed with Draco."""
         return self._decoded is not None
 
@@ -306,13 +306,13 @@ def _mesh(
     if points is None:
         raise KeyError("POSITION")
     # Draco always encodes triangles.
-    mode = _TRIANGLES if values.decoded else draw.mode
+    mode = _TRIANGLES if values.uses_draco else draw.mode
     triangles = _triangles(values.indices(len(points)), mode)
     place = use.coords, use.matrix
     uv = _coordinates(values, *place, len(points), optional=use.optional)
     colors, raw = None, values.attribute("COLOR_0", len(points))
     if raw is not None:
-        colors = encoded(raw[:, :3] * use.light)[triangles]
+        colors = encode_srgb(raw[:, :3] * use.light)[triangles]
         if use.see_through and not (raw[:, 3:] == 1).all():
             notes.note("PTM-N215", "opacities of vertices dropped", draw.place)
     return points, triangles, uv[triangles], colors

@@ -98,7 +98,7 @@ class SampleLines:
         intersection of row i of the first other axis and row j of the n of the second."""
         return self._rows[axis]
 
-    def along(self, axis: int) -> Crossings:
+    def crossings(self, axis: int) -> Crossings:
         """The crossings of the lines along ``axis`` (0, 1 or 2)."""
         u, v = (k for k in range(3) if k != axis)
         width = len(self._rows[v])
@@ -111,7 +111,7 @@ class SampleLines:
             i, j = np.divmod(rank, self._count[v][face])
             i, j = i + self._first[u][face], j + self._first[v][face]
             corner = self._points[self._triangles[face]]
-            hit, height = _crossed(
+            hit, height = _cross_triangles(
                 corner[:, :, u] - self._rows[u][i][:, None],
                 corner[:, :, v] - self._rows[v][j][:, None],
                 corner[:, :, axis],
@@ -147,7 +147,7 @@ def _batches(pairs: Ints) -> Iterator[Ints]:
     yield from np.split(faces, np.flatnonzero(np.diff(batch)) + 1) if len(faces) else ()
 
 
-def _crossed(x: Floats, y: Floats, z: Floats) -> tuple[Bools, Floats]:
+def _cross_triangles(x: Floats, y: Floats, z: Floats) -> tuple[Bools, Floats]:
     """(n,) whether the line along z through the origin crosses each triangle, whose corners have
     the coordinates (n, 3); and z of the crossings."""
     after, before = [1, 2, 0], [2, 0, 1]
@@ -197,7 +197,7 @@ def _places(
 ) -> tuple[Floats, Ints]:
     """For each place of the grid in three dimensions: the distance of the two surfaces that enclose
     it along the axis, infinite without them, and the number of these that face away from it."""
-    crossings = lines.along(axis)
+    crossings = lines.crossings(axis)
     rows = [lines.rows(k) for k in range(3)]
     width, depth = (len(row) for k, row in enumerate(rows) if k != axis)
     space = np.full((width * depth, len(rows[axis])), np.inf)

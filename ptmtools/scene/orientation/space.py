@@ -288,10 +288,10 @@ def _ask(
 
 def to_world(points: Floats, space: Space) -> Floats:
     """(n, 3) points of the model in world metres, Y up."""
-    return rotated((points - np.array(space.origin)) * space.metres, space.up)
+    return rotate((points - np.array(space.origin)) * space.metres, space.up)
 
 
-def rotated(vectors: Floats, up: Up) -> Floats:
+def rotate(vectors: Floats, up: Up) -> Floats:
     """(n, 3) vectors of the model in world axes: Z up maps (x, y, z) to (x, z, -y)."""
     if up == "y":
         return vectors

@@ -68,7 +68,7 @@ class NamedFaces:
     doors: tuple[NDArray[np.int64], ...] = ()
 
     @staticmethod
-    def of(
+    def from_names(
         objects: tuple[Sequence[str], NDArray[np.integer]],
         materials: tuple[Sequence[str], NDArray[np.integer]],
     ) -> NamedFaces:
@@ -143,7 +143,7 @@ def evidence(
     scale = float(side.max()) or 1.0
     local = (points - points.min(axis=0)) / scale
     lines = SampleLines(local, triangles)
-    crossings = [lines.along(axis) for axis in range(3)]
+    crossings = [lines.crossings(axis) for axis in range(3)]
     normals = [_unit_normals(local, triangles[crossing.triangle]) for crossing in crossings]
     face, normal, area = _sampled_faces(crossings, normals)
     named_level, named_upright = named.level[face], named.upright[face]

@@ -74,7 +74,7 @@ def metres_of(stage: Any) -> float | None:
     return metres if 0 < metres < float("inf") else None
 
 
-def up_of(stage: Any) -> Literal["y", "z"] | None:
+def up_axis(stage: Any) -> Literal["y", "z"] | None:
     """The up axis, if the stage defines it."""
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
         return None

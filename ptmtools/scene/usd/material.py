@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pxr import Ar, Sdf, Usd, UsdGeom, UsdShade
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.scene.colors import encoded, luminance, to_srgb
+from ptmtools.scene.colors import encode_srgb, luminance, to_srgb
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import SourceMaterial, SourceWrap
@@ -280,7 +280,7 @@ class UsdPainter:
         """The (T,) materials, (T, 3, 2) coordinates and, if there are any, (T, 3, 3) colours of a
         mesh, whose ``key`` is that of all its instances (`key_of`)."""
         two_sided = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get(TIME))
-        surfaces, face_surface = self._bound(prim, shape)
+        surfaces, face_surface = self._bind(prim, shape)
         index = face_surface[shape.face]
         material = np.zeros(len(index), dtype=np.int64)
         uv = np.zeros((len(index), 3, 2))
@@ -300,7 +300,7 @@ class UsdPainter:
                 colors[faces] = corners[faces]
         return material, uv, colors
 
-    def _bound(self, prim: Any, shape: UsdMesh) -> tuple[list[UsdSurface | None], Ints]:
+    def _bind(self, prim: Any, shape: UsdMesh) -> tuple[list[UsdSurface | None], Ints]:
         """The surfaces of a mesh, and (F,) the surface of each of its faces."""
         binding = UsdShade.MaterialBindingAPI(prim)
         subsets = binding.GetMaterialBindSubsets()
@@ -351,7 +351,7 @@ class UsdPainter:
             if values is not None:
                 self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB")
                 constant = primvar.GetInterpolation() == UsdGeom.Tokens.constant
-                colors = (tint(values[0, 0]), None) if constant else (_WHITE, encoded(values))
+                colors = (tint(values[0, 0]), None) if constant else (_WHITE, encode_srgb(values))
             self._colors[cached] = colors
         return self._colors[cached]
 

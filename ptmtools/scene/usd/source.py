@@ -31,7 +31,7 @@ from ptmtools.scene.usd.layers import (
     metres_of,
     open_stage,
     reason,
-    up_of,
+    up_axis,
     used_files,
 )
 from ptmtools.scene.usd.material import UsdMaterialReader, UsdPainter, key_of
@@ -86,7 +86,7 @@ class Traversal:
 
     def group(self) -> Group:
         """The drawn prims of the stage; notes the others. Raises InputError PTM-I254."""
-        result = self._below(self._stage.GetPseudoRoot(), None)
+        result = self._group_below(self._stage.GetPseudoRoot(), None)
         for (missed, code, message), count in self._omitted.items():
             (self._notes.miss if missed else self._notes.note)(code, message, "", count)
         return result
@@ -98,7 +98,7 @@ class Traversal:
             return str(path.MakeRelativePath(default.GetPath()))
         return str(path)[1:]
 
-    def _below(self, root: Any, prototype: Any | None) -> Group:
+    def _group_below(self, root: Any, prototype: Any | None) -> Group:
         """The drawn prims at and below a prim, of a prototype in the space of its parent."""
         group = Group()
         predicate = _predicate(root)
@@ -192,7 +192,7 @@ class Traversal:
             self._prototypes[path] = None
             prim = self._stage.GetPrimAtPath(path)
             if prim:
-                self._prototypes[path] = self._below(prim, prim)
+                self._prototypes[path] = self._group_below(prim, prim)
         if self._prototypes[path] is None:
             self._omitted[True, "PTM-N214", f"{path}: no such prototype"] += 1
         return self._prototypes[path]
@@ -262,7 +262,7 @@ def _make(
         materials=painter.materials,
         cameras=_cameras(traversal.cameras, notes),
         metres=metres_of(stage),
-        up=up_of(stage),
+        up=up_axis(stage),
     )
     return source, painter.images, list(dict.fromkeys(files) | used_files(stage, path, notes))
 

@@ -12,7 +12,7 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.orientation.space import UNITS, DeclaredSpace, parse_unit, rotated, settle
+from ptmtools.scene.orientation.space import UNITS, DeclaredSpace, parse_unit, rotate, settle
 from ptmtools.scene.orientation.up_axis import NamedFaces
 from tests.scene.buildings import atrium, box, corridor, house, site_plan, tower, welded, y_up
 from tests.scene.districts import boulder, city, flat, hills, museum, serpentine, square, table
@@ -33,11 +33,11 @@ def test_units_that_are_none(given: str | float) -> None:
 
 
 def test_turning_is_a_rotation() -> None:
-    axes = rotated(np.eye(3), "z")
+    axes = rotate(np.eye(3), "z")
     assert axes.tolist() == [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
     assert np.linalg.det(axes) == 1
     assert not np.signbit(axes[0]).any()
-    assert rotated(np.eye(3), "y").tolist() == np.eye(3).tolist()
+    assert rotate(np.eye(3), "y").tolist() == np.eye(3).tolist()
 
 
 def test_each_unit_can_be_guessed_or_given() -> None:

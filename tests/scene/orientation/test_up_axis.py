@@ -268,7 +268,7 @@ def test_names_decide_where_shapes_do_not() -> None:
     for up, axis in (("y", 1), ("z", 2)):
         lies = np.ptp(cube[:, :, axis], axis=1) == 0
         names = ["floor.001" if lies[2 * i] else "Wall_north" for i in range(6)]
-        named = NamedFaces.of((names, face), (["paint"], np.zeros(12, dtype=int)))
+        named = NamedFaces.from_names((names, face), (["paint"], np.zeros(12, dtype=int)))
         ranked = read_with(cube, named)
         assert ranked[0].up == up
         assert axis_ahead(ranked) >= CLOSE_AXIS
@@ -283,7 +283,7 @@ def read_with(triangles: Floats, named: NamedFaces) -> list[Candidate]:
 
 def test_words_in_names() -> None:
     names = ["GroundFloor", "floor_lamp", "Drywall", "south-wall", "indoor", "Tür 2", "Poster"]
-    named = NamedFaces.of((names, np.arange(7)), (["Decke"] + [""] * 6, np.arange(7)))
+    named = NamedFaces.from_names((names, np.arange(7)), (["Decke"] + [""] * 6, np.arange(7)))
     assert np.flatnonzero(named.level).tolist() == [0, 1]
     assert np.flatnonzero(named.upright).tolist() == [3]
     assert [leaf.tolist() for leaf in named.doors] == [[5]]
