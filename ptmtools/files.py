@@ -190,6 +190,13 @@ def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
     return path
 
 
+def real_place(root: Path, relative: str) -> Path:
+    """The path of the file ``relative`` below ``root``, whose folder is created; raises as
+    `real_folder`."""
+    *folders, name = _steps(root, relative)
+    return real_folder(root, "/".join(folders)) / name
+
+
 def real_file(root: Path, relative: str) -> Path | None:
     """The regular file ``relative`` (with slashes) below ``root``, or None if there is none.
 

@@ -384,7 +384,7 @@ def _read_geometry(stored: Stored, cells: int) -> dict[str, NDArray[Any]]:
     vertex = stored.array("vertex", np.float64, None, 3, finite=True)
     triangle = stored.indices("triangle", np.int32, None, 3, high=len(vertex))
     n = len(triangle)
-    stored = stored.repeated(len(vertex), "vertex_uv").repeated(n, "triangle_cell")
+    stored = stored.repeat_rows(len(vertex), "vertex_uv").repeat_rows(n, "triangle_cell")
     return {
         "vertex": vertex,
         "vertex_uv": stored.array("vertex_uv", np.float64, len(vertex), 2, finite=True),

@@ -225,12 +225,12 @@ class Artifacts:
     @contextmanager
     def reading(self, name: str) -> Iterator[None]:
         """Turns faults in the contents of a file of the database into PTM-D006."""
-        from ptmtools.store.folder import damaged
+        from ptmtools.store.folder import damage_error
 
         try:
             yield
         except FAULTS as fault:
-            raise damaged(self.db.path / name, f"{type(fault).__name__} {fault}") from fault
+            raise damage_error(self.db.path / name, f"{type(fault).__name__} {fault}") from fault
 
 
 class Run(Artifacts):

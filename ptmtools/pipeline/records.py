@@ -145,7 +145,7 @@ def reasons(
         # Other options may need fewer inputs, which is no further reason.
         if files and not (options and change == "removed"):
             lines.append(f"{_listed(files)} {change}")
-    if not lines and (lost := db.damaged(before.outputs)):
+    if not lines and (lost := db.first_damage(before.outputs)):
         lines.append(f"{lost} is missing or damaged")
     return tuple(lines)
 

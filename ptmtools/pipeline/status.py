@@ -26,7 +26,7 @@ from ptmtools.store.lock import holder, is_held
 from ptmtools.store.manifest import Manifest
 from ptmtools.store.remote import folder_to_build, model_file
 from ptmtools.store.transaction import finished_tasks
-from ptmtools.store.writer import admitted
+from ptmtools.store.writer import starting_manifest
 
 State = Literal["done", "not run", "stale", "damaged"]
 
@@ -126,7 +126,7 @@ def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
             sizes.append(db.size(name, digest))
     state: State = "done"
     why = ""
-    if lost := db.damaged(record.outputs):
+    if lost := db.first_damage(record.outputs):
         state, why = "damaged", f"{lost} is missing or damaged"
     elif earlier := artifacts.outdated(stage):
         state, why = "stale", f"made from an earlier {earlier}"
@@ -181,7 +181,7 @@ def plan_build(
         folder_to_build(db, new=True, force=force) as (folder, remote),
     ):
         check_file(file)
-        database = DatabaseFolder(folder, admitted(folder, file.name, force=force))
+        database = DatabaseFolder(folder, starting_manifest(folder, file.name, force=force))
         database.elsewhere = remote
         database.manifest = database.without_lost()
         artifacts = Artifacts(database, file, planned=True)

@@ -298,7 +298,7 @@ class Scene:
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n = len(triangles)
-        stored = stored.repeated(n, *_OFTEN_ALIKE)
+        stored = stored.repeat_rows(n, *_OFTEN_ALIKE)
         normal_uv = None
         if any(material.normal and material.normal.own for material in materials):
             normal_uv = stored.array("normal_uv", np.float64, n, 3, 2, finite=True)

@@ -34,7 +34,7 @@ from ptmtools.site.conversion import lean_glb, web_texture, without_exact
 from ptmtools.site.entry import Entry
 from ptmtools.site.files import DATA, Files
 from ptmtools.site.front import Front, SiteOptions as SiteOptions
-from ptmtools.store.folder import DatabaseFolder, damaged
+from ptmtools.store.folder import DatabaseFolder, damage_error
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.texture.previews import FORMATS
 
@@ -214,7 +214,7 @@ class _Builder:
             try:
                 source = data = lean_glb(data)
             except FileError as fault:
-                raise damaged(file, str(fault)) from None
+                raise damage_error(file, str(fault)) from None
         name = self._files.add(stem, suffix, media, source, digest=digest, compressed=True)
         return name, min(len(data), len(compress(data)))
 
@@ -258,7 +258,7 @@ class _Builder:
         mark = sha256("".join(digest for _, digest in places).encode())
         for row, (file, digest) in zip(rows, places, strict=True):
             if not file.is_file() or file.stat().st_size != row["bytes"]:
-                raise damaged(file, "is not the preview that the index has")
+                raise damage_error(file, "is not the preview that the index has")
             media = _IMAGE_MEDIA[file.suffix]
             name = self._files.add(file.stem, file.suffix, media, file, digest=digest, mark=mark)
             yield {key: value for key, value in row.items() if key != "error"} | {"file": name}
@@ -302,7 +302,7 @@ class _Builder:
         name = f"{SERVED}/{os.path.normpath(unquote(url))}"
         file = self._folder.path / name
         if name not in self._digests:
-            raise damaged(file, "the manifest does not list it")
+            raise damage_error(file, "the manifest does not list it")
         return file, self._digests[name]
 
 

@@ -22,7 +22,7 @@ from ptmtools.files import open_regular
 from ptmtools.glb import COMPONENTS
 from ptmtools.output.gltf import pack, unpack
 from ptmtools.output.model import offsets_of, sizes_of
-from ptmtools.store.folder import damaged, unreadable
+from ptmtools.store.folder import damage_error, reading_error
 
 #: Textures that the page decodes.
 PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
@@ -66,11 +66,11 @@ def web_texture(file: Path, row: Mapping[str, Any]) -> SiteTexture:
             header = read_header(stream.read(HEAD_MAX))
             size = os.fstat(stream.fileno()).st_size
     except OSError as fault:
-        raise unreadable(file, fault) from None
+        raise reading_error(file, fault) from None
     except InputError as fault:
-        raise damaged(file, fault.message) from None
+        raise damage_error(file, fault.message) from None
     if size != header.file_size or [level.end for level in header.levels] != row["ends"]:
-        raise damaged(file, "is not the texture that the index has")
+        raise damage_error(file, "is not the texture that the index has")
     if header.profile in PROFILES and header.kind == KIND and header.version == VERSION:
         return SiteTexture(row)
     return _encoded_again(file, row)
@@ -92,7 +92,7 @@ def without_exact(file: Path, texture: SiteTexture) -> SiteTexture:
         try:
             data = file.read_bytes()
         except OSError as fault:
-            raise unreadable(file, fault) from None
+            raise reading_error(file, fault) from None
     data = cut(data, levels)
     changed = {
         "width": sizes[levels - 1][0],
@@ -112,7 +112,7 @@ def _encoded_again(file: Path, row: Mapping[str, Any]) -> SiteTexture:
             before = f"{ptm.header.profile}, {ptm.header.kind}"
             texels = in_eight_bits(ptm.level(len(ptm.header.levels) - 1))
     except InputError as fault:
-        raise damaged(file, fault.message) from None
+        raise damage_error(file, fault.message) from None
     buffer = io.BytesIO()
     options = EncodeOptions(min_level=-len(row["ends"]))
     detail = encode_to(buffer, texels, options)

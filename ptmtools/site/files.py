@@ -11,7 +11,7 @@ from typing import TypeVar
 from ptmtools.errors import InputError, LimitError
 from ptmtools.site.about import ICONS, MANIFEST, MANIFEST_MEDIA, icon, manifest_of
 from ptmtools.site.entry import DIGITS, Entry, state_of
-from ptmtools.store.folder import damaged
+from ptmtools.store.folder import damage_error
 from ptmtools.store.layout import sha256
 
 T = TypeVar("T")
@@ -68,7 +68,7 @@ class Files:
         except LimitError:
             raise
         except InputError as fault:
-            raise damaged(Path(fault.file or database), fault.message) from None
+            raise damage_error(Path(fault.file or database), fault.message) from None
 
 
 def add_manifest(files: Files, title: str) -> None:

@@ -17,7 +17,7 @@ from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import GLB, Site
 from ptmtools.site.entry import Entry, is_marked
 from ptmtools.site.program import ELEMENT, INDEX
-from ptmtools.store.folder import damaged, unreadable
+from ptmtools.store.folder import damage_error, reading_error
 from ptmtools.store.layout import sha256
 
 #: The list of our files, and the caching rules for hosts that read them from a file.
@@ -124,7 +124,7 @@ def digest_of(entry: Entry) -> str:
     with reading(entry.source):
         digest = file_digest(entry.source)
     if entry.digest and digest != entry.digest:
-        raise damaged(entry.source, "its SHA-256 is not the recorded one")
+        raise damage_error(entry.source, "its SHA-256 is not the recorded one")
     return digest
 
 
@@ -134,7 +134,7 @@ def reading(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as fault:
-        raise unreadable(file, fault) from fault
+        raise reading_error(file, fault) from fault
 
 
 def file_digest(file: Path, algorithm: str = "sha256") -> str:

@@ -24,7 +24,7 @@ from ptmtools.files import (
     leads_inside,
     open_regular,
     real_file,
-    real_folder,
+    real_place,
     refuse_existing,
     write_bytes,
     write_with,
@@ -49,7 +49,7 @@ from ptmtools.site.published import (
     steps_of_removal,
 )
 from ptmtools.site.uploading import upload
-from ptmtools.store.folder import damaged
+from ptmtools.store.folder import damage_error
 from ptmtools.store.layout import sha256
 from ptmtools.store.objects import is_url, plain_path
 
@@ -171,7 +171,7 @@ def _digest_in(root: Path, name: str) -> str | None:
 
 def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
     """Writes a file whole, or not at all."""
-    target = real_folder(root, name.rpartition("/")[0]) / name.rpartition("/")[2]
+    target = real_place(root, name)
     source = entry.source
     if isinstance(source, bytes):
         write_bytes(target, source, force=True)
@@ -182,7 +182,7 @@ def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
             shutil.copyfileobj(stream, file)
         file.seek(0)
         if hashlib.file_digest(file, "sha256").hexdigest() != digest:  # type: ignore[arg-type]
-            raise damaged(source, "it changed while it was copied")
+            raise damage_error(source, "it changed while it was copied")
 
     write_with(target, copy, force=True)
 

@@ -44,9 +44,9 @@ from ptmtools.site.published import (
     steps_of,
     steps_of_removal,
 )
-from ptmtools.store.folder import damaged
+from ptmtools.store.folder import damage_error
 from ptmtools.store.layout import sha256
-from ptmtools.store.objects import Headers, Held, Objects
+from ptmtools.store.objects import Headers, ListedObject, Objects
 
 FORMAT, SCHEMA = "ptmtools site objects", 1
 #: Objects that are sent at a time: each waits for the network.
@@ -62,7 +62,7 @@ class ObjectRow:
     md5: str
     version: str = ""
 
-    def is_of(self, present: Held | None) -> bool:
+    def is_of(self, present: ListedObject | None) -> bool:
         """Whether the object in a listing has the bytes of this row."""
         return present is not None and (
             bool(self.version and self.version == present.version)
@@ -147,7 +147,7 @@ def upload(
 
 
 def _stored_rows(
-    listing: Mapping[str, Held], items: Mapping[str, Item], written: Iterable[str]
+    listing: Mapping[str, ListedObject], items: Mapping[str, Item], written: Iterable[str]
 ) -> dict[str, ObjectRow]:
     """The rows of the written objects that are listed, with their versions."""
     return {
@@ -164,7 +164,7 @@ def _send(objects: Objects, items: Mapping[str, Item], name: str) -> None:
         with reading(item.body):
             state = state_of(item.body.stat())
         if item.entry.state not in (None, state):
-            raise damaged(item.body, "it changed while it was copied")
+            raise damage_error(item.body, "it changed while it was copied")
 
 
 def _item(entry: Entry, *, encode: bool) -> Item:
@@ -175,7 +175,7 @@ def _item(entry: Entry, *, encode: bool) -> Item:
     if encode and entry.compressed:
         data = entry.read()
         if sha256(data) != digest:
-            raise damaged(Path(entry.name), "it changed while it was copied")
+            raise damage_error(Path(entry.name), "it changed while it was copied")
         packed = compress(data)
         body = data
         if len(packed) < len(data):
@@ -189,7 +189,7 @@ def _item(entry: Entry, *, encode: bool) -> Item:
     return Item(entry, body, headers, ObjectRow(sha256(text.encode()), md5))
 
 
-def _rows(objects: Objects, present: Mapping[str, Held], force: bool) -> Rows:
+def _rows(objects: Objects, present: Mapping[str, ListedObject], force: bool) -> Rows:
     """The list of an earlier publication; empty for a new one, or one that was forced.
 
     Raises OutputError PTM-O010 if other objects are there.
@@ -208,7 +208,7 @@ def _rows(objects: Objects, present: Mapping[str, Held], force: bool) -> Rows:
 
 
 def _row_held(
-    objects: Objects, name: str, present: Held | None, rows: Sequence[ObjectRow]
+    objects: Objects, name: str, present: ListedObject | None, rows: Sequence[ObjectRow]
 ) -> ObjectRow:
     """The row whose bytes the object has; the first one if none fits. Only an interrupted run
     leaves an object without a version in the list: if the store gives no MD5, it is read."""

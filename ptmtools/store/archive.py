@@ -69,7 +69,7 @@ def pack_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
 
 def without_repeats(arrays: Arrays, *names: str) -> dict[str, NDArray[np.generic]]:
     """The arrays, and of those of these names only the first row where all rows are equal: readers
-    know their number (`Stored.repeated`)."""
+    know their number (`Stored.repeat_rows`)."""
     kept = dict(arrays)
     for name in names:
         array = np.asarray(arrays[name])
@@ -147,13 +147,13 @@ class Stored:
         if array.dtype.kind != np.dtype(dtype).kind:
             raise ValueError(f"{name} has elements of type {array.dtype}")
         sides = zip(shape, array.shape, strict=False)
-        if len(array.shape) != len(shape) or any(side not in (None, own) for side, own in sides):
+        if len(array.shape) != len(shape) or any(side not in (None, n) for side, n in sides):
             raise ValueError(f"{name} has the shape {array.shape}")
         if finite and not np.isfinite(array).all():
             raise ValueError(f"{name} has numbers that are not finite")
         return array.astype(dtype, copy=False)
 
-    def repeated(self, rows: int, *names: str) -> Stored:
+    def repeat_rows(self, rows: int, *names: str) -> Stored:
         """The same arrays, of those of these names with a single row as many: the inverse of
         `without_repeats`."""
         arrays = dict(self._arrays)

@@ -51,7 +51,7 @@ class Digests:
                     for name, (a, b, c, d, digest) in document["files"].items()
                 }
 
-    def of(self, path: Path) -> str:
+    def digest(self, path: Path) -> str:
         """Hex digest of a regular file.
 
         Raises OSError if it cannot be read.
@@ -94,7 +94,7 @@ class Digests:
     def _remember(self, path: Path, stamp: Stamp, digest: str, before: int) -> None:
         """Caches the digest of a file read at the time ``before``, unless the file may have changed
         since."""
-        if stamp == _stamp(path) and _settled(stamp, before):
+        if stamp == _stamp(path) and _is_settled(stamp, before):
             # This differs from ``path`` if a link precedes a ``..``.
             self._known[os.path.abspath(path)] = (stamp, digest)
             self._changed = True
@@ -106,7 +106,7 @@ def _stamp(path: Path) -> Stamp:
     return state.st_size, state.st_ino, state.st_mtime_ns, state.st_ctime_ns
 
 
-def _settled(stamp: Stamp, now: int) -> bool:
+def _is_settled(stamp: Stamp, now: int) -> bool:
     """Whether a change at the time ``now``, ns, or later would change the stamp."""
     tick = COARSE_TICK if stamp[2] % 1_000_000_000 == 0 else TICK
     return max(stamp[2:]) + tick < now

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from ptmtools.errors import DatabaseError, Rebuild
-from ptmtools.files import open_regular, real_folder, write_bytes
+from ptmtools.files import open_regular, real_place, write_bytes
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
 from ptmtools.store.lists import ReadList, list_file, read_list
@@ -93,7 +93,7 @@ class DatabaseFolder:
         DatabaseError: PTM-D005 if it is missing, PTM-D006 if its hash is not the recorded one.
         """
         try:
-            return _read(self.path / name, digest)
+            return read_recorded(self.path / name, digest)
         except DatabaseError:
             if self.elsewhere is None or self.elsewhere.size(digest) is None:
                 raise
@@ -115,7 +115,7 @@ class DatabaseFolder:
         try:
             return file.stat().st_size
         except OSError as fault:
-            raise unreadable(file, fault) from fault
+            raise reading_error(file, fault) from fault
 
     def read_output(self, stage: str, name: str) -> bytes:
         """The bytes of an output that a stage must have; raises as `output` and `read`."""
@@ -142,8 +142,7 @@ class DatabaseFolder:
         """Copies a file that is only elsewhere into the folder; raises as `read`."""
         missing = self.elsewhere is None or self.elsewhere.size(digest) is None
         if not missing and not self.has(name, digest):
-            folder, _, base = name.rpartition("/")
-            write_bytes(real_folder(self.path, folder) / base, self.read(name, digest), force=True)
+            write_bytes(real_place(self.path, name), self.read(name, digest), force=True)
 
     def without_lost(self, *, thoroughly: bool = False) -> Manifest:
         """The manifest without stages that lack one of their lists (`Manifest.lost`), or with
@@ -158,9 +157,9 @@ class DatabaseFolder:
                     len(record.inputs), len(record.outputs)
                 except DatabaseError:
                     lost[name] = next(iter(files))
-        return self.manifest.without(lost)
+        return self.manifest.without_stages(lost)
 
-    def damaged(self, outputs: Mapping[str, str]) -> str | None:
+    def first_damage(self, outputs: Mapping[str, str]) -> str | None:
         """The first file that is missing or has another hash, or None."""
         elsewhere = self.elsewhere
         for name, digest in outputs.items():
@@ -171,19 +170,19 @@ class DatabaseFolder:
     def has(self, name: str, digest: str) -> bool:
         """Whether the folder itself has a file."""
         with suppress(OSError, ValueError):  # a NUL in the name
-            return self.digests.of(self.path / name) == digest
+            return self.digests.digest(self.path / name) == digest
         return False
 
 
-def _read(file: Path, digest: str) -> bytes:
-    """See `DatabaseFolder.read`."""
+def read_recorded(file: Path, digest: str) -> bytes:
+    """The bytes of a file; raises as `DatabaseFolder.read`."""
     try:
         with open_regular(file) as stream:
             data = stream.read()
     except OSError as fault:
-        raise unreadable(file, fault) from fault
+        raise reading_error(file, fault) from fault
     if sha256(data) != digest:
-        raise damaged(file, "its SHA-256 is not the recorded one")
+        raise damage_error(file, "its SHA-256 is not the recorded one")
     return data
 
 
@@ -192,17 +191,17 @@ def lists_in(folder: Path) -> ReadList:
 
     def read(digest: str) -> Mapping[str, str]:
         file = folder / list_file(digest)
-        return read_list(_read(file, digest), file=file)
+        return read_list(read_recorded(file, digest), file=file)
 
     return read
 
 
-def unreadable(file: Path, fault: OSError) -> DatabaseError:
+def reading_error(file: Path, fault: OSError) -> DatabaseError:
     """The error for a file of a database that cannot be read, PTM-D005."""
     return _unusable("PTM-D005", f"cannot be read ({fault.strerror or fault})", file)
 
 
-def damaged(file: Path, what: str) -> DatabaseError:
+def damage_error(file: Path, what: str) -> DatabaseError:
     """The error for a file of a database with damaged contents, PTM-D006."""
     return _unusable("PTM-D006", f"damaged: {what}", file)
 

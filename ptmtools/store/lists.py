@@ -47,9 +47,9 @@ class FileList(Mapping[str, str]):
 
     @cached_property
     def _files(self) -> dict[str, str]:
-        return self.without(())
+        return self.files_except(())
 
-    def without(self, lists: Collection[str], *, readable: bool = False) -> dict[str, str]:
+    def files_except(self, lists: Collection[str], *, readable: bool = False) -> dict[str, str]:
         """The files that are not in these lists, of which none is read; with ``readable``, those of
         the lists that can be read."""
         files: dict[str, str] = {}
@@ -102,7 +102,7 @@ def in_lists(
     return FileList(digests, read) if digests else files
 
 
-def stored(files: Mapping[str, str]) -> dict[str, str] | list[str]:
+def stored_form(files: Mapping[str, str]) -> dict[str, str] | list[str]:
     """Files as the manifest has them, or the SHA-256 of their lists."""
     return list(files.lists) if isinstance(files, FileList) else dict(sorted(files.items()))
 

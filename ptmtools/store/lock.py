@@ -53,7 +53,7 @@ class Holder:
         return f"process {self.pid}" + ("" if self._here else f" on {self.host}")
 
     @property
-    def gone(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether it is known to have ended. This process may have got its number."""
         if not self._here or fcntl is None:  # on Windows, signal 0 would end the process
             return False
@@ -86,7 +86,7 @@ def acquire(folder: Path) -> Callable[[], None]:
         with writing(file):
             descriptor = os.open(file, os.O_RDWR | os.O_CREAT | _FLAGS, 0o644)
         # Between opening and locking it, its last holder may have removed it.
-        if _locked(descriptor, folder) and _is(descriptor, file):
+        if _lock(descriptor, folder) and _is_named(descriptor, file):
             process = {"pid": os.getpid(), "host": socket.gethostname()}
             with suppress(OSError):  # on a full disk it stays empty
                 os.ftruncate(descriptor, 0)
@@ -129,12 +129,12 @@ def is_held(folder: Path) -> bool:
     except OSError:
         return False
     try:
-        return not _locked(descriptor, folder)
+        return not _lock(descriptor, folder)
     finally:
         os.close(descriptor)
 
 
-def _locked(descriptor: int, folder: Path) -> bool:
+def _lock(descriptor: int, folder: Path) -> bool:
     """Takes the lock, unless another process holds it."""
     try:
         if fcntl is None:
@@ -146,11 +146,11 @@ def _locked(descriptor: int, folder: Path) -> bool:
         if fault.errno in (errno.EAGAIN, errno.EACCES):
             return False
         owner = holder(folder)  # a disk without locks
-        return owner is None or owner.gone
+        return owner is None or owner.has_ended
     return True
 
 
-def _is(descriptor: int, file: Path) -> bool:
+def _is_named(descriptor: int, file: Path) -> bool:
     """Whether the open file is the one that has this name now."""
     try:
         return os.path.samestat(os.fstat(descriptor), os.stat(file, follow_symlinks=False))

@@ -33,7 +33,7 @@ from ptmtools import schemas
 from ptmtools.errors import DatabaseError
 from ptmtools.files import leads_inside
 from ptmtools.store.layout import WRITTEN
-from ptmtools.store.lists import FileList, ReadList, in_lists, list_file, stored
+from ptmtools.store.lists import FileList, ReadList, in_lists, list_file, stored_form
 
 FORMAT = "ptmtools database"
 SCHEMA = 3
@@ -62,16 +62,16 @@ class StageRecord:
         lists = [
             files.lists for files in (self.inputs, self.outputs) if isinstance(files, FileList)
         ]
-        return {list_file(digest): digest for own in lists for digest in own}
+        return {list_file(digest): digest for part in lists for digest in part}
 
-    def listed(self, read: ReadList, write: Callable[[str, bytes], None]) -> StageRecord:
+    def with_lists(self, read: ReadList, write: Callable[[str, bytes], None]) -> StageRecord:
         """A copy with lists instead of many inputs or outputs, see `in_lists`."""
-        inputs, outputs = (in_lists(each, read, write) for each in (self.inputs, self.outputs))
+        inputs, outputs = (in_lists(files, read, write) for files in (self.inputs, self.outputs))
         return replace(self, inputs=inputs, outputs=outputs)
 
     def entry(self) -> dict[str, Any]:
         """Its entry in the manifest."""
-        files = {"inputs": stored(self.inputs), "outputs": stored(self.outputs)}
+        files = {"inputs": stored_form(self.inputs), "outputs": stored_form(self.outputs)}
         return {name: files.get(name, getattr(self, name)) for name in _FIELDS}
 
 
@@ -117,20 +117,20 @@ class Manifest:
         """Every file of the database with its SHA-256, except the manifest itself."""
         return {**self.outputs(), **self.lists()}
 
-    def beyond(self, former: Manifest | None, *, readable: bool = False) -> dict[str, str]:
+    def outputs_beyond(self, former: Manifest | None, *, readable: bool = False) -> dict[str, str]:
         """The outputs that are not in a list of the former manifest: all that it lacks or has with
         other digests, and more. With ``readable``, those of the lists that can be read."""
         outputs: dict[str, str] = {}
         for stage, record in self.stages.items():
-            own, before = record.outputs, former.stages.get(stage) if former else None
+            files, before = record.outputs, former.stages.get(stage) if former else None
             known = before.outputs if before else None
-            if isinstance(own, FileList):
+            if isinstance(files, FileList):
                 shared = set(known.lists) if isinstance(known, FileList) else ()
-                own = own.without(shared, readable=readable)
-            outputs |= own
+                files = files.files_except(shared, readable=readable)
+            outputs |= files
         return outputs
 
-    def without(self, lost: Mapping[str, str]) -> Manifest:
+    def without_stages(self, lost: Mapping[str, str]) -> Manifest:
         """A copy without these stages, see `lost`."""
         stages = {name: record for name, record in self.stages.items() if name not in lost}
         return replace(self, stages=stages, lost=lost)
@@ -157,7 +157,7 @@ class Manifest:
             document = json.loads(data)
         except (ValueError, RecursionError) as fault:
             raise damaged_manifest(file, f"not JSON ({fault})") from fault
-        if _nested(document, _MAX_DEPTH):
+        if _is_nested(document, _MAX_DEPTH):
             raise damaged_manifest(file, f"nested more than {_MAX_DEPTH} deep")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
@@ -196,12 +196,12 @@ def all_outputs(files: Mapping[str, str]) -> bool:
     return all(digest and _is_output(name) for name, digest in files.items())
 
 
-def _nested(value: object, deepest: int) -> bool:
+def _is_nested(value: object, deepest: int) -> bool:
     """Whether lists and objects are nested deeper than in any option or count."""
     if not isinstance(value, dict | list):
         return False
     inner = value.values() if isinstance(value, dict) else value
-    return deepest == 0 or any(_nested(each, deepest - 1) for each in inner)
+    return deepest == 0 or any(_is_nested(part, deepest - 1) for part in inner)
 
 
 def _is_output(path: object) -> bool:

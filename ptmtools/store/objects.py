@@ -39,7 +39,7 @@ class Headers:
 
 
 @dataclass(frozen=True)
-class Held:
+class ListedObject:
     """An object in a listing.
 
     Attributes
@@ -55,13 +55,13 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Kind:
+class StoreKind:
     """A kind of store whose objects have headers.
 
     Attributes
     ----------
     arguments: the headers as arguments of fsspec's calls.
-    version, md5: of a row of a listing, see `Held`.
+    version, md5: of a row of a listing, see `ListedObject`.
     condition: that an object still has a version, or with "" that there is none, as arguments.
     settings: arguments of the file system.
     """
@@ -105,7 +105,7 @@ def _gs_condition(version: str) -> dict[str, Any]:
     return {} if version else {"mode": "create"}
 
 
-_S3 = Kind(
+_S3 = StoreKind(
     _s3_arguments,
     lambda row: str(row.get("ETag", "")).strip('"'),
     _s3_md5,
@@ -113,7 +113,7 @@ _S3 = Kind(
     # Otherwise s3fs asks for the size of each object before it reads it.
     {"max_concurrency": 1},
 )
-_GS = Kind(_gs_arguments, lambda row: str(row.get("generation", "")), _gs_md5, _gs_condition)
+_GS = StoreKind(_gs_arguments, lambda row: str(row.get("generation", "")), _gs_md5, _gs_condition)
 #: Stores whose objects have headers, by the protocol of their URLs.
 KINDS = {"s3": _S3, "s3a": _S3, "gs": _GS, "gcs": _GS}
 #: Protocols of web servers, which list no files.
@@ -176,7 +176,7 @@ class Objects:
                 raise InputError("PTM-I111", f"is no URL of a store ({fault})", file=url) from None
         self._system, self._root = opened[0], str(opened[1]).rstrip("/")
 
-    def listing(self) -> dict[str, Held]:
+    def listing(self) -> dict[str, ListedObject]:
         """All objects by their names below the URL; empty if there are none.
 
         Raises OutputError PTM-O012, as all methods.
@@ -190,26 +190,26 @@ class Objects:
                 return {}
         begin = f"{self._root}/"
         return {
-            name.removeprefix(begin): self._held(row)
+            name.removeprefix(begin): self._listed_object(row)
             for name, row in rows.items()
             if name.startswith(begin) and not name.endswith("/")
         }
 
-    def held(self, name: str) -> Held | None:
+    def info(self, name: str) -> ListedObject | None:
         """An object as a listing has it; None if there is none."""
         if not self.kind:  # other properties than in a listing
             return self.listing().get(name)
         with self._asking("cannot be read", name):
             try:
-                return self._held(self._system.info(self._path(name)))
+                return self._listed_object(self._system.info(self._path(name)))
             except FileNotFoundError:
                 return None
 
-    def _held(self, row: Mapping[str, Any]) -> Held:
+    def _listed_object(self, row: Mapping[str, Any]) -> ListedObject:
         size = int(row["size"])
         if self.kind:
-            return Held(size, self.kind.version(row), self.kind.md5(row))
-        return Held(size, " ".join(str(row[key]) for key in _CHANGING if key in row), "")
+            return ListedObject(size, self.kind.version(row), self.kind.md5(row))
+        return ListedObject(size, " ".join(str(row[key]) for key in _CHANGING if key in row), "")
 
     def read(self, name: str, start: int = 0, end: int | None = None) -> bytes:
         """The bytes of an object, or those from ``start`` to before ``end``."""

@@ -31,9 +31,9 @@ from pathlib import Path
 from ptmtools.errors import DatabaseError, OutputError, PtmError, Rebuild
 from ptmtools.files import (
     leads_inside,
-    open_regular,
     real_file,
     real_folder,
+    real_place,
     write_bytes,
     writing,
 )
@@ -41,7 +41,7 @@ from ptmtools.parallel import map_in_order
 from ptmtools.progress import announce
 from ptmtools.store.copies import BUILDS, DATABASES, READERS, folder_for, note_url
 from ptmtools.store.digests import Digests
-from ptmtools.store.folder import damaged, last_manifest, lists_in, read_manifest, unreadable
+from ptmtools.store.folder import last_manifest, lists_in, read_manifest, read_recorded
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.store.lists import read_list
 from ptmtools.store.lock import acquire
@@ -100,14 +100,14 @@ class RemoteDatabase:
         """
         announce(f"reading {self.url}")
         note_url(self.folder.parent, self.url)
-        held = self._objects.listing()
-        self._version = held[MANIFEST].version if MANIFEST in held else ""
-        self._sizes = {n.partition("/")[2]: row.size for n, row in held.items() if n != MANIFEST}
+        listing = self._objects.listing()
+        self._version = listing[MANIFEST].version if MANIFEST in listing else ""
+        self._sizes = {n.partition("/")[2]: row.size for n, row in listing.items() if n != MANIFEST}
         self._listed = True
-        if MANIFEST not in held:
+        if MANIFEST not in listing:
             if not new:
                 raise DatabaseError("PTM-D001", "there is no such database", file=self.url)
-            if any(not name.startswith(f"{OBJECTS}/") for name in held) and not force:
+            if any(not name.startswith(f"{OBJECTS}/") for name in listing) and not force:
                 raise OutputError(
                     "PTM-O010",
                     "the URL has objects and is not a ptmtools database",
@@ -126,7 +126,7 @@ class RemoteDatabase:
         self._before = manifest, data
         copied = self._is_copied(manifest, data) if self.reading else self._is_current()
         if not copied:
-            with self._locked():
+            with self._lock_copy():
                 self._bring(manifest.files() if self.reading else manifest.lists())
                 self._replace_manifest(manifest, data)
                 self._remember()
@@ -188,7 +188,7 @@ class RemoteDatabase:
         assert manifest
         now = manifest.files()
         if self._version_now() != self._version:
-            raise self._overtaken()
+            raise self._conflict()
         missing = {d: name for name, d in now.items() if d not in self._sizes}
         for _ in map_in_order(self._send, missing.items(), AT_ONCE):
             pass
@@ -198,30 +198,23 @@ class RemoteDatabase:
                 self._objects.write(MANIFEST, data, _STATE, instead_of=self._version)
             except OutputError:
                 if self._version_now() != self._version:
-                    raise self._overtaken() from None
+                    raise self._conflict() from None
                 raise
             self._version = self._version_now()
         self._remember()
         if before:
-            former = {*before.beyond(None, readable=True).values(), *before.lists().values()}
-            old = former.difference(now.values()) & self._sizes.keys()
+            former = before.outputs_beyond(None, readable=True) | before.lists()
+            old = {*former.values()}.difference(now.values()) & self._sizes.keys()
             for _ in map_in_order(self._objects.remove, map(object_of, sorted(old)), AT_ONCE):
                 pass
 
     def _version_now(self) -> str:
-        held = self._objects.held(MANIFEST)
-        return held.version if held else ""
+        present = self._objects.info(MANIFEST)
+        return present.version if present else ""
 
     def _send(self, item: tuple[str, str]) -> None:
         digest, name = item
-        file = self.folder / name
-        try:
-            data = file.read_bytes()
-        except OSError as fault:
-            raise unreadable(file, fault) from fault
-        if sha256(data) != digest:
-            raise damaged(file, "its SHA-256 is not the recorded one")
-        self.write(digest, data)
+        self.write(digest, read_recorded(self.folder / name, digest))
 
     def _is_current(self) -> bool:
         """Whether the copy was made from this state of the URL."""
@@ -243,12 +236,14 @@ class RemoteDatabase:
         def bring(item: tuple[str, str]) -> None:
             name, digest = item
             file = real_file(self.folder, name)
-            if file is not None and digests.of(file) == digest:
+            if file is not None and digests.digest(file) == digest:
                 return
-            folder, _, base = name.rpartition("/")
+            data = b""
+            with suppress(DatabaseError):
+                data = read_recorded(builds / name, digest)
             with suppress(*() if self.reading else (DatabaseError,)):
-                data = _held(builds / name, digest) or self.read(digest)
-                write_bytes(real_folder(self.folder, folder) / base, data, force=True)
+                data = data or self.read(digest)
+                write_bytes(real_place(self.folder, name), data, force=True)
 
         for _ in map_in_order(bring, files.items(), AT_ONCE):
             pass
@@ -261,7 +256,7 @@ class RemoteDatabase:
         write_bytes(self.folder / MANIFEST, data, force=True)
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _lock_copy(self) -> Iterator[None]:
         with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
         release = acquire(self.folder)
@@ -273,7 +268,7 @@ class RemoteDatabase:
     def _remember(self) -> None:
         write_bytes(self._base, self._version.encode(), force=True)
 
-    def _overtaken(self) -> DatabaseError:
+    def _conflict(self) -> DatabaseError:
         return DatabaseError(
             "PTM-D007",
             "another ptm has written this database since this one has read it",
@@ -303,25 +298,24 @@ def fetch_model(url: str) -> Path:
     listing = objects.listing()
     of_databases = {name for name in listing if _OF_DATABASE.search(name)}
     of_databases |= {_OF_DATABASE.sub(f"/{MANIFEST}", name) for name in of_databases}
-    held = {n: row for n, row in listing.items() if leads_inside(n) and n not in of_databases}
-    if name not in held:
+    files = {n: row for n, row in listing.items() if leads_inside(n) and n not in of_databases}
+    if name not in files:
         raise objects.failure("there is no such model", url)
     folder = real_folder(folder_for("models", base))
     index = folder / "versions.json"
     known = json.loads(index.read_bytes()) if index.is_file() else {}
     copy = real_folder(folder, "files")
 
-    def bring(own: str) -> None:
-        if known.get(own) != held[own].version or real_file(copy, own) is None:
-            parent, _, last = own.rpartition("/")
-            write_bytes(real_folder(copy, parent) / last, objects.read(own), force=True)
+    def bring(file: str) -> None:
+        if known.get(file) != files[file].version or real_file(copy, file) is None:
+            write_bytes(real_place(copy, file), objects.read(file), force=True)
 
-    for _ in map_in_order(bring, held, AT_ONCE):
+    for _ in map_in_order(bring, files, AT_ONCE):
         pass
     with writing(copy):
-        for own in known.keys() - held.keys():
-            remove_output(copy, own)
-    versions = {own: row.version for own, row in held.items()}
+        for file in known.keys() - files.keys():
+            remove_output(copy, file)
+    versions = {file: row.version for file, row in files.items()}
     write_bytes(index, json.dumps(versions).encode(), force=True)
     return copy / name
 
@@ -363,11 +357,3 @@ def naming_url(url: str, copy: Path) -> Iterator[None]:
             name = Path(fault.file).relative_to(copy).as_posix()
             fault.file = url if name == "." else f"{url}/{name}"
         raise
-
-
-def _held(file: Path, digest: str) -> bytes | None:
-    """The bytes of a file, if they have the digest."""
-    with suppress(OSError), open_regular(file) as stream:
-        data = stream.read()
-        return data if sha256(data) == digest else None
-    return None

@@ -24,7 +24,7 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.files import real_file, real_folder, write_bytes, writing
+from ptmtools.files import real_file, real_folder, real_place, write_bytes, writing
 from ptmtools.store.folder import DatabaseFolder, last_manifest, lists_in
 from ptmtools.store.layout import MANIFEST, STAGING, arrays_of, sha256
 from ptmtools.store.manifest import Manifest, StageRecord
@@ -71,7 +71,7 @@ class Transaction:
         """
         digest = digest or sha256(data)
         if not self.keep({name: digest}):
-            write_bytes(self._place(name), data, force=True)
+            write_bytes(real_place(self.subfolder(), name), data, force=True)
             self._staged.add(name)
         self._pending[name] = digest
 
@@ -89,7 +89,7 @@ class Transaction:
             if self.keep({name: digest}):
                 file.unlink()
             else:
-                file.replace(self._place(name))
+                file.replace(real_place(self.subfolder(), name))
                 self._staged.add(name)
         self._pending[name] = digest
 
@@ -120,7 +120,7 @@ class Transaction:
     def keep(self, outputs: Mapping[str, str]) -> bool:
         """Keeps committed outputs; False if one is missing or different."""
         # The names of many files are in lists, so they are looked up last.
-        if self._db.damaged(outputs):
+        if self._db.first_damage(outputs):
             return False
         if any(self._committed.get(name) != digest for name, digest in outputs.items()):
             return False
@@ -168,8 +168,9 @@ class Transaction:
         with self._turn:
             read = lists_in(self._db.path)
             stages = {**self._db.manifest.stages, **records}
-            listed = {name: each.listed(read, self._put_list) for name, each in stages.items()}
-            manifest = self._db.manifest.with_stages(listed)
+            manifest = self._db.manifest.with_stages(
+                {name: stages[name].with_lists(read, self._put_list) for name in stages}
+            )
             self._remove_others()
             write_bytes(self.subfolder() / MANIFEST, manifest.to_bytes(), force=True)
             _complete(self._db.path, self._relative)
@@ -182,7 +183,7 @@ class Transaction:
 
     def _put_list(self, name: str, data: bytes) -> None:
         if not self._db.has(name, sha256(data)):
-            write_bytes(self._place(name), data, force=True)
+            write_bytes(real_place(self.subfolder(), name), data, force=True)
             self._staged.add(name)
 
     def _remove_others(self) -> None:
@@ -191,11 +192,6 @@ class Transaction:
         for name in _files_below(folder) - self._staged:
             if file := real_file(folder, name):
                 file.unlink()
-
-    def _place(self, name: str) -> Path:
-        """The path of a staged output, whose folder is created."""
-        folder, _, base = name.rpartition("/")
-        return self.subfolder(folder) / base
 
 
 def recover(folder: Path) -> None:
@@ -261,7 +257,7 @@ def _complete(folder: Path, relative: str) -> None:
         staged = _files_below(staging)
         for name in sorted(after.lists().keys() & staged):  # the outputs are read from them
             _move(staging, name, folder)
-        for name in sorted(after.beyond(before).keys() & staged):
+        for name in sorted(after.outputs_beyond(before).keys() & staged):
             _move(staging, name, folder)
         if before:
             remove_former(folder, before, after)
@@ -279,17 +275,16 @@ def _files_below(folder: Path) -> set[str]:
 
 
 def _move(staging: Path, name: str, folder: Path) -> None:
-    parent, _, base = name.rpartition("/")
     if source := real_file(staging, name):
-        source.replace(real_folder(folder, parent) / base)
+        source.replace(real_place(folder, name))
 
 
 def remove_former(folder: Path, before: Manifest, after: Manifest) -> None:
     """Removes the files that a former manifest alone lists, its lists last: an interrupted call
     needs them. Files stay that only a lost list names."""
     with suppress(DatabaseError):  # a list of the later manifest is lost
-        kept = after.beyond(before)
-        for name in before.beyond(after, readable=True).keys() - kept.keys():
+        kept = after.outputs_beyond(before)
+        for name in before.outputs_beyond(after, readable=True).keys() - kept.keys():
             remove_output(folder, name)
     for name in before.lists().keys() - after.lists().keys():
         remove_output(folder, name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from threading import Lock
 
@@ -79,9 +80,8 @@ class DatabaseWriter(DatabaseFolder):
         try:
             with writing(folder):
                 folder.mkdir(parents=True, exist_ok=True)
-            return DatabaseWriter(
-                folder, lambda: admitted(folder, model, force=force), created, thoroughly=force
-            )
+            manifest = partial(starting_manifest, folder, model, force=force)
+            return DatabaseWriter(folder, manifest, created, thoroughly=force)
         except BaseException as fault:
             _remove_empty(created)
             if isinstance(fault, OutputError) and fault.code == "PTM-O002":
@@ -111,7 +111,7 @@ class DatabaseWriter(DatabaseFolder):
         return Transaction(self, name, self._turn)
 
 
-def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
+def starting_manifest(folder: Path, model: str, *, force: bool) -> Manifest:
     """The manifest that a build of ``model`` starts from (design, "Overwriting"): an empty one for
     a new folder.
 

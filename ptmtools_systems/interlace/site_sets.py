@@ -15,7 +15,7 @@ from typing import Any
 from ptmtools.errors import InputError, LimitError
 from ptmtools.output.names import texture_name
 from ptmtools.site.entry import DIGITS, Entry, state_of
-from ptmtools.store.folder import damaged
+from ptmtools.store.folder import damage_error
 from ptmtools.store.layout import sha256
 from ptmtools_systems.interlace.declarations import INTERLACED
 from ptmtools_systems.interlace.model import INDEX
@@ -43,7 +43,7 @@ def set_entries(
         try:
             interlaced = read_manifest(manifest.parent)
         except (InputError, LimitError) as fault:
-            raise damaged(manifest, fault.message) from None
+            raise damage_error(manifest, fault.message) from None
         media = f"image/{'jpeg' if interlaced.container == 'jpg' else interlaced.container}"
         files = []
         for part in interlaced.parts:

@@ -177,7 +177,7 @@ def test_an_interrupted_build_leaves_the_former_database(
     # A reader sees the former state, and leaves the copy of the build alone.
     former = DatabaseFolder.open(fetch_database(url))
     assert former.manifest == before
-    assert former.damaged(before.files()) is None
+    assert former.first_damage(before.files()) is None
     store.requests.clear()
     report = build_scene(rooms, url, EMBREE, FAST, workers=1)
     # The copy was ahead: nothing is computed or sent again.
@@ -266,13 +266,13 @@ def test_two_builds_at_a_time(
     build_scene(rooms, url, EMBREE, TextureOptions(), workers=1)
     first = manifest_of(store, bucket, "db")
     if checked_by == "store":
-        held = Objects.held
+        info = Objects.info
         stale = [None]
 
         def late(self: Objects, name: str) -> Any:
-            return stale.pop() if stale else held(self, name)
+            return stale.pop() if stale else info(self, name)
 
-        monkeypatch.setattr(Objects, "held", late)
+        monkeypatch.setattr(Objects, "info", late)
     with pytest.raises(DatabaseError, match="PTM-D007"):
         slow.commit()
     assert manifest_of(store, bucket, "db") == first

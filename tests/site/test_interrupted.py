@@ -124,9 +124,9 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Steps]:
     return made
 
 
-def _kind(md5: Callable[[Any], str]) -> objects.Kind:
+def _kind(md5: Callable[[Any], str]) -> objects.StoreKind:
     """A store in memory whose objects have headers."""
-    return objects.Kind(
+    return objects.StoreKind(
         lambda headers: {}, lambda row: str(row["created"]), md5, lambda version: {}
     )
 

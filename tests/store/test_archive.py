@@ -52,7 +52,7 @@ def test_equal_rows_are_stored_once() -> None:
     stored = Stored(unpack_arrays(pack_arrays(arrays), file="x.npz"))
     with pytest.raises(ValueError, match="shape"):
         stored.array("uv", np.float64, 5, 3, 2)
-    again = stored.repeated(5, "uv", "number")
+    again = stored.repeat_rows(5, "uv", "number")
     assert np.array_equal(again.array("uv", np.float64, 5, 3, 2), uv)
     assert np.array_equal(again.array("number", np.int32, 5), number)
     with pytest.raises(ValueError, match="shape"):

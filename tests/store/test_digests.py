@@ -17,4 +17,4 @@ def test_a_path_back_out_of_a_linked_folder(tmp_path: Path) -> None:
     for there in (False, True):
         if there:
             (tmp_path / "file").write_bytes(b"wrong")
-        assert Digests(tmp_path).of(path) == hashlib.sha256(b"right").hexdigest()
+        assert Digests(tmp_path).digest(path) == hashlib.sha256(b"right").hexdigest()

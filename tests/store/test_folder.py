@@ -27,7 +27,7 @@ def test_commits_and_reads_back(tmp_path: Path) -> None:
     db = DatabaseFolder.open(tmp_path / "a" / "db")
     outputs = db.record("cells").outputs
     assert db.read("stages/x", outputs["stages/x"]) == b"1"
-    assert db.damaged(outputs) is None
+    assert db.first_damage(outputs) is None
     assert set(files_below(db.path)) == {MANIFEST, "stages/x", "www/y"}
 
 
@@ -114,4 +114,4 @@ def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:
     (tmp_path / "www/a").unlink()
     with pytest.raises(DatabaseError, match="PTM-D005"):
         db.read("www/a", db.record("cells").outputs["www/a"])
-    assert db.damaged(db.record("cells").outputs) == "www/a"
+    assert db.first_damage(db.record("cells").outputs) == "www/a"

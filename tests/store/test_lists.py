@@ -154,7 +154,7 @@ def test_a_staged_file_of_another_run_stays_out(tmp_path: Path) -> None:
     write(tmp_path, {"www/a": b"old", "www/b": b"c"})
     db = DatabaseFolder.open(tmp_path)
     assert (tmp_path / "www/a").read_bytes() == b"old"
-    assert db.damaged(db.record("cells").outputs) is None
+    assert db.first_damage(db.record("cells").outputs) is None
 
 
 @pytest.mark.usefixtures("short")

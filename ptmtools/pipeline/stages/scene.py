@@ -103,7 +103,7 @@ def _digests(model: Path, names: Iterable[str], digests: Digests) -> dict[str, s
     for name in dict.fromkeys((model.name, *names)):
         file = model.parent / name
         try:
-            result[name] = digests.of(file) if file.is_file() else ""
+            result[name] = digests.digest(file) if file.is_file() else ""
         except OSError:
             result[name] = ""
     return result

@@ -216,7 +216,7 @@ class TexturesJob(Job):
         files = _files_by_stem(before)
 
         def is_lost(name: str) -> bool:
-            return artifacts.db.damaged(files.get(stem_of(name), {})) is not None
+            return artifacts.db.first_damage(files.get(stem_of(name), {})) is not None
 
         return [name for name in work.inputs if name in stale or is_lost(name)]
 
