@@ -168,7 +168,7 @@ class Manifest:
                 "PTM-D003",
                 f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
                 file=file,
-                remedy="use the ptmtools that wrote it",
+                remedy="use the ptmtools that wrote it, or build the database anew with --force",
             )
         try:
             schemas.check(document, schemas.MANIFEST)
