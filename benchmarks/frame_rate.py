@@ -146,10 +146,10 @@ def pages_of_database(way: Floats, budgets: Sequence[int], policies: Sequence[st
             f"?policy={policy}&memory={budget}",
             way,
             "(x, y, z, yaw, pitch) => ptm.walker.place({ eye: [x, y, z], yaw, pitch })",
-            "window.ptm?.walk.begun && ptm.walk.sharpness.full",
+            "window.ptm?.walk.begun && ptm.walk.viewport.full",
             "ptm.state().pending === 0",
             # The way is exact, and each picture has all pixels.
-            "ptm.walker.step = () => {}; ptm.walk.sharpness.settle = () => false;",
+            "ptm.walker.step = () => {}; ptm.walk.viewport.settle = () => false;",
         )
         for budget in budgets
         for policy in policies

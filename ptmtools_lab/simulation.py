@@ -14,14 +14,12 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.link import Conditions
+from ptmtools.site.client import LOOK_SECONDS
 from ptmtools_lab.allocation import picture
 from ptmtools_lab.client import DOCUMENTS, Client, FileKind
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import PolicyEntry
 from ptmtools_lab.world import World
-
-#: Seconds between updates of a client in a browser, unless something has arrived.
-LOOK_SECONDS = 0.2
 
 
 @dataclass(frozen=True)

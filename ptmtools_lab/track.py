@@ -10,6 +10,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.output.served import Served
+from ptmtools.site.client import STILL_DEGREES, STILL_METRES, STILL_SECONDS
 from ptmtools.walk import Browser
 
 if TYPE_CHECKING:
@@ -21,8 +22,7 @@ RATE = 5.0
 MOST_FRAMES = 100_000
 #: Share of the walk that may lie in no cell.
 _ASTRAY = 0.05
-#: A viewpoint is still if it moved less (metres) and turned less (cosine) in the last second.
-STILL_SECONDS, _STILL_METRES, _STILL_COSINE = 1.0, 1e-3, np.cos(np.radians(1.0))
+_STILL_COSINE = np.cos(np.radians(STILL_DEGREES))
 
 
 @dataclass(frozen=True)
@@ -176,5 +176,5 @@ def _still(time: Floats, eye: Floats, direction: Floats, seconds: float = STILL_
     for f in np.flatnonzero(time >= seconds).tolist():
         last = slice(int(begin[f]), f + 1)
         moved = np.abs(eye[last] - eye[f]).max()
-        still[f] = moved < _STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
+        still[f] = moved < STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
     return still

@@ -24,6 +24,7 @@ from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Frustum, RayCamera
 from ptmtools.rendering.records import Lossy, Pyramids, Shows
+from ptmtools.site.client import ITEM_PIXELS
 from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps
 from ptmtools.walk import Browser
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
@@ -75,8 +76,6 @@ def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Flo
 
 #: Pixels of the item buffer that errors are summed over.
 PIXELS = (160, 90)
-#: Pixels of the item buffer of a browser, whatever the aspect of its screen.
-_ITEM_PIXELS = 3600
 
 
 @dataclass(frozen=True)
@@ -290,6 +289,6 @@ def read_forms(
 
 def _camera(walk: Walk, browser: Browser) -> RayCamera:
     """A camera with twice as many pixels each way as the viewer's item buffer."""
-    tall = max(1, round(np.sqrt(_ITEM_PIXELS / walk.aspect)))
-    wide = max(1, round(_ITEM_PIXELS / tall))
+    tall = max(1, round(np.sqrt(ITEM_PIXELS / walk.aspect)))
+    wide = max(1, round(ITEM_PIXELS / tall))
     return RayCamera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)

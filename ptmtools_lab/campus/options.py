@@ -8,15 +8,8 @@ from typing import ClassVar, Literal
 from ptmtools.link import Conditions, Trace
 from ptmtools.options import option, require
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
+from ptmtools.site.client import CAMPUS_MOVE, CAMPUS_NEAREST, CAMPUS_THREADS
 from ptmtools_systems.campus.model import PRESETS, Quality
-
-#: Number of nearest objects in high detail (the paper's IV).
-NEAREST = 8
-#: Number of objects loaded at a time; the paper does not state it (notes).
-THREADS = 4
-#: Movement of the viewpoint, metres, after which objects are sorted again; the paper does not state
-#: it (notes).
-MOVE = 2.0
 
 
 @dataclass(frozen=True)
@@ -69,10 +62,10 @@ class CampusWalkOptions:
     memory: str = option(
         "inf", "Memory for meshes, textures and lightmaps: 64MiB or inf.", metavar="SIZE"
     )
-    nearest: int = option(NEAREST, "Number of nearest objects shown in high detail.")
-    threads: int = option(THREADS, "Number of objects loaded at a time.")
+    nearest: int = option(CAMPUS_NEAREST, "Number of nearest objects shown in high detail.")
+    threads: int = option(CAMPUS_THREADS, "Number of objects loaded at a time.")
     move: float = option(
-        MOVE, "Distance after which the client sorts the objects again.", metavar="METRES"
+        CAMPUS_MOVE, "Distance after which the client sorts the objects again.", metavar="METRES"
     )
     lightmaps: bool = option(True, "Load the lightmaps of the campus.")
     stored: bool = option(False, "Count meshes and index as stored, not as compressed by a server.")

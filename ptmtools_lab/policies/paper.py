@@ -36,10 +36,9 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import kernel, plain_kernel
 from ptmtools.options import option, require
 from ptmtools.quantities import MemorySize, parse_memory
-from ptmtools.site.client import AHEAD, BEFORE
+from ptmtools.site.client import AHEAD, BEFORE, PATIENCE, PATIENCE_STILL, STILL_SECONDS
 from ptmtools_lab.client import Client, FileKind, Range
 from ptmtools_lab.network import FluidLink
-from ptmtools_lab.track import STILL_SECONDS
 from ptmtools_lab.world import World
 
 
@@ -146,10 +145,12 @@ class PaperOptions:
     heading: ClassVar[str] = "Policy paper"
 
     delta_t: float = option(
-        0.5, "Maximum time to download a level while the viewpoint moves.", metavar="SECONDS"
+        PATIENCE, "Maximum time to download a level while the viewpoint moves.", metavar="SECONDS"
     )
     delta_t_static: float = option(
-        20.0, "Maximum time to download a level while the viewpoint is static.", metavar="SECONDS"
+        PATIENCE_STILL,
+        "Maximum time to download a level while the viewpoint is static.",
+        metavar="SECONDS",
     )
     static_memory: str = option(
         "",

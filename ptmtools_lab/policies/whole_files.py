@@ -36,7 +36,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.rendering.rays import NEAR
-from ptmtools.site.client import CONNECTIONS
+from ptmtools.site.client import CONNECTIONS, RING
 from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink
 from ptmtools_lab.world import World
@@ -159,11 +159,6 @@ class WholeClient(WholeFileClient):
             t = next(iter(self._held))
             del self._held[t]
             used -= int(self._size[t])
-
-
-#: Width of a ring around the camera, metres. Narrower rings make worse pictures, wider ones are not
-#: better everywhere (docs/design/neighbours.md).
-RING = 8.0
 
 
 class GpuiiClient(WholeFileClient):

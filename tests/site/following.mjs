@@ -6,12 +6,12 @@ const lines = Number(process.argv[2]), asked = [];
 const preview = (level, n) => ({ file: `${level}-${n}.webp`, level, bytes: 1, width: 1, height: 1, difference: 1 });
 const texture = { file: "t.ptm", ends: [1], width: 8, height: 8, components: 3, previews: [1, 2, 3].map(preview) };
 const index = { textures: [texture, { ...texture, previews: [preview(3, "other")] }], cells: [] };
-let present = [];
+globalThis.document = { hidden: false };
 const downloads = {
   free: () => true,
   ask: (kind, number, priority) => (asked.push([kind, number, priority]), { kind, number, priority }),
 };
-new Stream({
+const stream = new Stream({
   site: { index, of: (file) => file, texture: (t) => `${t}`, cell: () => "" },
   index,
   client: { catalogue: { T: 2, K: 5 }, downloads, next: () => null, arrived: () => {}, failed: () => {} },
@@ -23,10 +23,8 @@ new Stream({
     over: Promise.resolve(), bytes: 0, take: async () => null,
   },
   decoders: { workers: {}, geometry: async () => null },
-  lines: () => lines,
-  rests: () => false,
-  expect: (columns) => (present = [...columns]),
   report: (fault) => { throw fault; },
 });
+const present = [...await stream.follow({ angle: 1, across: () => lines })];
 await new Promise((done) => setImmediate(done));
 console.log(JSON.stringify({ asked, present }));

@@ -24,7 +24,7 @@ async function orderOf({ texture, octree, sight, share, there }) {
     },
     load: async (_, end) => order.push([true, levels = end]),
   };
-  const stream = { rests: () => false, pump() {} };
+  const stream = { rests: false, pump() {} };
   weighLevels({ client, stream, policy: "best", begun: true, index: { octrees: [octree] } }, statues);
   client.learnRecord(0, record);
   client.learnGeometry(0, [{ texture: 0, low: [0, 0, 0], high: [1, 1, 1] }]);

@@ -46,26 +46,21 @@ class Session extends EventTarget {
 
 class Walk {
   poses = [];
-  sharpness = {};
-  far = 50;
-  drawn = [];
-  renderer = new (class {
-    draw() {}
-  })();
+  viewport = { far: 50, tall: 1, aspect: 1, lines: 1 };
+  picture = {
+    drawn: [],
+    renderer: new (class {
+      draw() {}
+    })(),
+    turn() {},
+  };
   constructor(gl) {
     this.gl = gl;
-  }
-  get tall() {
-    return 1;
-  }
-  get aspect() {
-    return 1;
   }
   frame(pose) {
     if (this.fails) throw new Error("frame");
     this.poses.push(pose);
   }
-  turn() {}
 }
 
 /** The walk after a session, and what its visitor is told. */
@@ -86,7 +81,7 @@ async function visit({ fails = "", head = {}, cant = [0, 0] }) {
   };
   const none = () => {}, gl = { makeXRCompatible: async () => refuse("card"), isContextLost: () => false };
   for (const name of ["bindFramebuffer", "enable", "disable", "viewport", "scissor"]) gl[name] = none;
-  const walk = new Walk(gl), { sharpness } = walk, own = Object.keys(walk).join();
+  const walk = new Walk(gl), { viewport } = walk, own = Object.keys(walk).join();
   walk.fails = fails === "frame";
   const solids = new Solids();
   solids.add(0, [], { portals: [] });
@@ -103,7 +98,7 @@ async function visit({ fails = "", head = {}, cant = [0, 0] }) {
   if (!message) await session.end();
   await over;
   await new Promise((go) => setTimeout(go));
-  const same = app.frame === frame && walk.sharpness === sharpness && walk.frame === Walk.prototype.frame
+  const same = app.frame === frame && walk.viewport === viewport && walk.frame === Walk.prototype.frame
     && Object.keys(walk).filter((name) => name !== "fails").join() === own;
   return { walk, walker, message, same, ended: fails === "session" || session.ended > 0 };
 }

@@ -360,7 +360,7 @@ def test_a_headset_sees_two_pictures(visit: Callable[..., Any], museum: Site) ->
         visitor.frames(3)
         left, right = halves(visitor)
         assert np.abs(left - right).max() < 1
-        head = "ptm.walk.drawn.length && ptm.state().pose"
+        head = "ptm.walk.picture.drawn.length && ptm.state().pose"
         assert page.evaluate(head)["eye"] == start["eye"]
         # A lower head sees more of the floor; the walker stays as tall.
         page.evaluate("ptmHeadset.head = [0, 0.6, 0]")

@@ -52,7 +52,7 @@ def test_the_way_through_a_door(
                 visitor.page.evaluate("(pose) => window.ptm.goTo(pose)", pose)
                 visitor.complete()
                 visitor.page.wait_for_function(
-                    "window.ptm.walk.visible.every((c) => window.ptm.walk.renderer.cells.has(c))"
+                    "ptm.walk.visible.every((c) => ptm.walk.picture.renderer.cells.has(c))"
                 )
                 pictures.setdefault(doors, []).append(visitor.picture())
                 visible = visitor.page.evaluate("window.ptm.walk.visible")

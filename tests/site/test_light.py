@@ -93,7 +93,7 @@ def test_a_lightmap_is_in_view_with_its_cell(visit: Visiting, site: Site) -> Non
     with visit(site, width=WIDTH, height=HEIGHT) as visitor:
         visitor.complete()
         cell, wide, present = visitor.page.evaluate(
-            "[ptm.walk.cell, ptm.walk.catalogue.K, [...ptm.walk.present]]"
+            "[ptm.walk.cell, ptm.walk.client.catalogue.K, [...ptm.walk.needs.present]]"
         )
     (number,) = (n for n, row in enumerate(rows) if row.get("light") == cell)
     shares = present[number * wide + 1 : number * wide + 1 + len(rows[number]["ends"])]

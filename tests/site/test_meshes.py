@@ -16,9 +16,9 @@ from tests.systems.apo.statues import write_rooms
 #: Triangles that the page has, and those that it draws.
 COUNTS = """({
   here: [...ptm.walk.stream.shapes.values()].flat().reduce((n, s) => n + s.indices.length / 3, 0),
-  drawn: [...ptm.walk.renderer.cells.values()].flatMap(({ batches }) => batches)
+  drawn: [...ptm.walk.picture.renderer.cells.values()].flatMap(({ batches }) => batches)
     .reduce((n, { count }) => n + count / 3, 0),
-  files: ptm.walk.catalogue.meshes.map(({ file }) => file),
+  files: ptm.walk.client.catalogue.meshes.map(({ file }) => file),
 })"""
 #: Near to each statue; the first viewpoint is far from one.
 NEAR = [[-2.8, 1.5, 0.6], [2.7, 1.5, -0.4]]

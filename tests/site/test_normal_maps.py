@@ -21,7 +21,7 @@ WIDTH, HEIGHT = 320, 240
 QUICK = ["--samples", "4", "--format", "gltf", "-j", "1", "--backend", "embree"]
 #: Eyes in the first room, with yaw in degrees: at a wall and the ceiling, and at the floor.
 EYES = {"wall": ((-2.1, 2.2, 0.9), 20.0), "floor": ((-3.2, 0.5, 1.3), -45.0)}
-HELD = "window.ptm.walk.renderer.statues?.levels ?? []"
+HELD = "window.ptm.walk.picture.renderer.statues?.levels ?? []"
 
 
 @pytest.fixture(scope="module", params=["unlit", "lit"])
@@ -98,11 +98,11 @@ def test_they_come_after_the_first_picture(revisit: Visiting, site: Site) -> Non
 def test_the_simulator_wants_the_same_levels(revisit: Visiting, site: Site, database: Path) -> None:
     """Of a map beside the textures of walls and floor, as much as its own pixels want."""
     served = read_served(database)
-    name, K = "floor", "window.ptm.walk.catalogue.K"
+    name, K = "floor", "window.ptm.walk.client.catalogue.K"
     number = next(
         n for n, row in enumerate(served.index["textures"]) if row["file"] == "textures/waves.ptm"
     )
-    row = f"[...window.ptm.walk.present].slice({number} * {K}, {number + 1} * {K})"
+    row = f"[...window.ptm.walk.needs.present].slice({number} * {K}, {number + 1} * {K})"
     with revisit(site, query=address(name), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         actual = np.array(visitor.page.evaluate(row))[1:]

@@ -47,7 +47,7 @@ async () => {
 }
 """
 #: Everything of the site is here.
-ALL = "ptm.walk.exact && s.pending === 0 && ptm.walk.client.next(ptm.walk.estimate) === null"
+ALL = "ptm.walk.exact && s.pending === 0 && ptm.walk.client.next(ptm.walk.stream.estimate) === null"
 
 
 #: The names that the browser keeps.

@@ -229,7 +229,7 @@ def test_exact_levels_replace_previews_in_place(visit: Callable[..., Any], room:
         assert state["complete"]
         # Coarser ones suffice for a while where the view does not resolve the finest.
         kept = "before.filter((one, t) => one === ptm.walk.memory.of(t)).length"
-        resolved = "before.filter((_, t) => ptm.walk.present[9 * t + 9 + t] > 0).length"
+        resolved = "before.filter((_, t) => ptm.walk.needs.present[9 * t + 9 + t] > 0).length"
         assert visitor.page.evaluate(kept) >= visitor.page.evaluate(resolved) > 3
         assert visitor.page.evaluate(LEVELS, 0) == digests(texture, levels_of(texture.texels))
         assert 0 < np.abs(visitor.picture() - before).mean() < 3

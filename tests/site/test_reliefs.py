@@ -18,7 +18,7 @@ from tests.site.conftest import PLAIN, Visiting
 from tests.systems.apo.statues import write_rooms
 
 WIDTH, HEIGHT = 320, 240
-LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
+LEVELS = "window.ptm.walk.picture.renderer.statues?.levels ?? []"
 #: An eye in front of each statue, and its yaw in degrees.
 EYES = {0: ((-2.8, 0.6, 0.5), 0.0), 1: ((2.7, 0.45, -0.3), 180.0)}
 
@@ -82,7 +82,7 @@ def test_they_are_drawn_as_by_render(
 
 #: How many levels of the first normal map the view wants.
 WANTED = """(() => {
-  const { present, catalogue: { K } } = window.ptm.walk;
+  const { client: { catalogue: { K } }, needs: { present } } = window.ptm.walk;
   const first = window.ptm.index.textures.findIndex((row) => row.relief === "statue_01");
   return [...present.slice(first * K, (first + 1) * K)].filter((share) => share > 0).length;
 })()"""

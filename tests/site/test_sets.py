@@ -137,7 +137,7 @@ def test_normal_maps_come_after_the_colours_of_a_room(visit: Visiting, tmp_path:
     with visit(site, query=GPUII, width=640, height=480) as visitor:
         visitor.complete()
         visitor.until(SETTLED)
-        visitor.until("ptm.walk.renderer.statues?.levels[0] > 0")
+        visitor.until("ptm.walk.picture.renderer.statues?.levels[0] > 0")
         held = visitor.state()["held"]
         assert visitor.messages == []
     seen = {t for t in bumps if held[t]}

@@ -25,7 +25,7 @@ from tests.web import node
 HERE = Path(__file__).parent
 WIDTH, HEIGHT = 320, 240
 #: Levels of each octree that has been in view.
-LEVELS = "window.ptm.walk.renderer.statues?.levels ?? []"
+LEVELS = "window.ptm.walk.picture.renderer.statues?.levels ?? []"
 
 
 @pytest.fixture(scope="module")

@@ -85,7 +85,7 @@ def visitor(chromium: Any, toured: Site) -> Iterator[Visitor]:
 def shown(visitor: Visitor) -> list[int]:
     """Labels whose markers are shown, after two item buffers."""
     visitor.complete()
-    visitor.until("window.ptm.walk.bufferAge !== null")
+    visitor.until("window.ptm.walk.needs.age !== null")
     visitor.frames(30)
     labels: list[int] = visitor.page.evaluate("ptm.tour.markers.shown")
     return labels

@@ -79,7 +79,7 @@ def test_whole_textures_are_uploaded_for_each_picture(
             visitor.until("s.exact && s.pending === 0")
             assert np.abs(visitor.picture().astype(int) - full).max() <= 2
             before = visitor.page.evaluate("window.uploads")
-            visitor.page.evaluate("ptm.walk.touch()")
+            visitor.page.evaluate("ptm.walk.picture.touch()")
             visitor.complete()
             assert (visitor.page.evaluate("window.uploads") > before) is again
             state = visitor.state()

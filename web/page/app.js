@@ -60,12 +60,12 @@ export class App {
     };
     const walk = (this.walk = new Walkthrough(canvas, gl, site, options, this.emit));
     const { connection } = /** @type {{connection?: {saveData?: boolean}}} */ (navigator);
-    walk.saving = connection?.saveData === true;
+    walk.stream.saving = connection?.saveData === true;
     walk.memory.fades = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     if (query.get("memory") === "auto") this.on("first-picture", () => this.#measure());
     this.solids = new Solids();
     /** @param {number[]} eye */
-    const locate = (eye) => walk.locator.locate(eye, walk.cell);
+    const locate = (eye) => walk.stream.locator.locate(eye, walk.cell);
     const avatar = site.index.avatarSize;
     this.walker = new Walker({ solids: this.solids, locate, avatar });
     this.goTo(0);
@@ -76,7 +76,7 @@ export class App {
 
   /** Goes to the pose of a link, if it is inside the building. @param {Pose} pose */
   follow(pose) {
-    const { low, high, C } = this.walk.catalogue;
+    const { low, high, C } = this.walk.client.catalogue;
     for (let c = 0; c < C; c++) {
       if (pose.eye.every((x, k) => low[3 * c + k] <= x && x <= high[3 * c + k])) {
         return this.goTo(pose);
@@ -123,7 +123,7 @@ export class App {
     } else {
       walker.place(place);
     }
-    walk.touch();
+    walk.picture.touch();
   }
 
   /** @param {number} bytes of texture memory */
@@ -163,7 +163,7 @@ export class App {
 
   /** @param {boolean} on whether only visible textures and cells are fetched */
   setDataSaver(on) {
-    this.walk.saving = on;
+    this.walk.stream.saving = on;
   }
 
   /** Records the walk from now on. */

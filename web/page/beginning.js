@@ -9,7 +9,7 @@ const STEPS = 10;
 
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function beginningOf(walk) {
-  const { catalogue: { T, K, levels }, client, memory, present, stream } = walk;
+  const { client, client: { catalogue: { T, K, levels } }, memory, needs: { expected, present }, stream } = walk;
   const parts = +stream.records.has(walk.cell) + +stream.shapes.has(walk.cell);
   let share = 0, total = 0;
   for (let t = 0; t < T; t++) {
@@ -26,6 +26,6 @@ export function beginningOf(walk) {
       total: 2 + STEPS,
     },
     // Without the room there is no picture; an item buffer says that it has been drawn.
-    over: parts === 2 && !walk.expects && ((!room && share >= ENOUGH * total) || walk.has(false)),
+    over: parts === 2 && !expected && ((!room && share >= ENOUGH * total) || walk.has(false)),
   };
 }

@@ -14,12 +14,12 @@ export class Comparison {
     this.memory = new TextureMemory(gl, rows, (t, levels) => stream.decode(t, levels));
     this.memory.fades = false;
     this.renderer = new Renderer(gl, this.memory, index.textures);
-    this.renderer.statues = walk.renderer?.statues ?? null;
+    this.renderer.statues = walk.picture.renderer.statues;
   }
 
   /** Requests the visible textures to the finest level that the view resolves; true once all are here. */
   settle() {
-    const { walk, memory } = this, { client, catalogue, present, estimate } = walk;
+    const { walk, memory } = this, { client, client: { catalogue }, needs: { present }, stream: { estimate } } = walk;
     const { T, K, levels, stored, ends, previews: { first, column, loss } } = catalogue;
     if (!present) return false;
     const want = new Int32Array(T), share = new Float64Array(T), losses = new Float64Array(T);

@@ -23,12 +23,12 @@ const MOST = 4;
  * @returns {Promise<Measured | null>} null, with a notice, if it fails
  */
 export async function measureBudget(app) {
-  const { walk } = app, { T, K, memory, whole } = walk.catalogue;
+  const { walk } = app, { T, K, memory, whole } = walk.client.catalogue;
   let picture = Infinity;
   for (let k = 0; k < PICTURES; k++) {
-    walk.touch();
+    walk.picture.touch();
     await frame();
-    picture = Math.min(picture, walk.fence?.took || Infinity);
+    picture = Math.min(picture, walk.picture.fence.took || Infinity);
   }
   // While a texture is replaced, it is there twice.
   let largest = 0;

@@ -43,11 +43,11 @@ export class Recorder {
 
   /** The document of the walk, with the conditions of the recording. */
   get document() {
-    const { tall, aspect, budget, policy, sharpness, catalogue } = this.walk;
+    const { budget, client: { catalogue }, policy, viewport: { tall, aspect, lines } } = this.walk;
     return {
       format: "ptmtools walk", schema: 1, fieldOfView: tall, aspect, samples: this.#samples,
       browser: {
-        begun: short(this.#begun), lines: sharpness.lines, budget: Math.round(budget), policy,
+        begun: short(this.#begun), lines, budget: Math.round(budget), policy,
         recordBytes: Array.from(catalogue.recordBytes),
         geometryBytes: Array.from(catalogue.geometryBytes),
         files: this.#files(), frames: this.#frames, ...this.#waits(),
@@ -57,7 +57,7 @@ export class Recorder {
 
   /** Files that the client did not request: time, kind, number, bytes. */
   #files() {
-    const { site, stream, catalogue } = this.walk, { opening } = stream, asked = new Map([[site.address, ["index", 0]]]);
+    const { client: { catalogue }, stream, stream: { opening, site } } = this.walk, asked = new Map([[site.address, ["index", 0]]]);
     site.index.cells.forEach((_, cell) => {
       asked.set(stream.url("record", cell), ["record", cell]);
       asked.set(stream.url("geometry", cell), ["geometry", cell]);

@@ -13,10 +13,10 @@ const MOST = 10_000;
 const RANGED = /\.ptm$|\/(?!opening-)[^/]*\.bin$/;
 
 /** @param {import("./app.js").App} app @returns {import("./offline/visits.js").Received} */
-function received({ walk: { renderer, site, stream } }) {
+function received({ walk: { picture: { renderer }, stream, stream: { site } } }) {
   const files = performance.getEntriesByType("resource").map(({ name }) => name.split("#")[0]);
   const textures = stream.files.map(({ length }, t) => ({ url: stream.url("texture", t), length }));
-  const levels = renderer?.statues?.levels ?? [], { octrees = [] } = site.index;
+  const levels = renderer.statues?.levels ?? [], { octrees = [] } = site.index;
   const objects = octrees.map(({ file, ends }, k) => ({ url: site.of(file), length: ends[levels[k] - 1] ?? 0 }));
   const ranged = [...textures, ...objects].filter(({ url, length }) => length > 0 && RANGED.test(url));
   return { index: site.address, files: files.filter((name) => !RANGED.test(name)), ranged };
@@ -38,7 +38,7 @@ if (worker) {
       known.add(key);
     }
     const app = appOf();
-    if (app) learn(app.walk.estimate, early.splice(0));
+    if (app) learn(app.walk.stream.estimate, early.splice(0));
   };
   worker.controller?.postMessage({ since: performance.timeOrigin });
   // Once at the first picture, and once everything is there.

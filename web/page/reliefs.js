@@ -8,13 +8,10 @@ import { Reliefs } from "./relief/reliefs.js";
 /**
  * Lets the renderer draw them, and octrees if there are any.
  * @param {import("./walkthrough.js").Walkthrough} walk
- * @param {(fault: import("./net/errors.js").PageError) => void} report
  */
-export async function show(walk, report) {
-  const { index: { octrees }, gl } = walk;
-  if (octrees) (await loadStatues()).show(walk, report);
-  const { renderer } = walk, reliefs = new Reliefs(gl, walk, report);
-  if (!renderer) return;
+export async function show(walk) {
+  if (walk.index.octrees) (await loadStatues()).show(walk);
+  const { picture: { renderer } } = walk, reliefs = new Reliefs(walk);
   const { statues } = renderer;
   renderer.statues = statues ? both(statues, reliefs) : reliefs;
 }

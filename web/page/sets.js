@@ -34,7 +34,7 @@ export async function setsOf(site, gl, options, fetcher) {
 
 /** @param {import("./walkthrough.js").Walkthrough} walk @param {TextureSet[]} sets */
 function attach(walk, sets) {
-  const { catalogue, client, gl, rows, sharpness } = walk, { K, T, memory } = catalogue;
+  const { client, client: { catalogue }, gl, picture, rows } = walk, { K, T, memory } = catalogue;
   const normals = walk.index.textures.map((row) => row.normals === true);
   for (let t = 0; t < T; t++) {
     for (let k = 1; k < K; k++) memory[t * K + k] = sets[t].memory[k - 1] ?? memory[t * K + k - 1];
@@ -55,18 +55,17 @@ function attach(walk, sets) {
     ]));
     learn(cell, shapes);
   };
-  const pixel = () => 2 * Math.tan(walk.tall / 2) / sharpness.lines;
+  const pixel = () => 2 / walk.viewport.across(Math.PI / 2);
   client.policy = () => new Gpuii(client, sets, pieces, pixel, normals);
   walk.policy = "gpuii";
   walk.memory.delete();
-  walk.memory = /** @type {any} */ (new JoinedMemory(gl, sets));
-  if (walk.renderer) walk.renderer.memory = walk.memory;
+  walk.memory = picture.renderer.memory = /** @type {any} */ (new JoinedMemory(gl, sets));
   walk.choose = walk.compare = () => walk.emit("notice", { message: objects.fixed });
 }
 
 /** The requests of steps become requests of files. @param {import("./walkthrough.js").Walkthrough} walk
  * @param {TextureSet[]} sets */
-function fetchFiles({ client, fetcher, stream }, sets) {
+function fetchFiles({ client, stream, stream: { fetcher } }, sets) {
   const { bytes } = client.downloads, url = stream.url.bind(stream), range = fetcher.range.bind(fetcher);
   const file = (/** @type {number} */ t, begin = bytes[t]) => sets[t].urls[sets[t].step(begin)];
   stream.url = (kind, number) => (kind === "texture" ? file(number) : url(kind, number));

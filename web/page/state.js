@@ -4,31 +4,31 @@ import { previews } from "./walk/textures.js";
 
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function stateOf(walk) {
-  const { client, estimate, fetcher, memory } = walk;
-  const levels = new Array(walk.catalogue.K).fill(0);
+  const { client, memory, needs, picture, stream, stream: { estimate, fetcher } } = walk;
+  const levels = new Array(client.catalogue.K).fill(0);
   for (const held of memory.held) levels[held]++;
   return {
     cell: walk.cell,
     visible: [...walk.visible],
-    drawnCells: walk.drawn.map(({ cell }) => cell).sort((a, b) => a - b),
+    drawnCells: picture.drawn.map(({ cell }) => cell).sort((a, b) => a - b),
     residentBytes: memory.bytes,
     peakBytes: memory.peak,
     budgetBytes: walk.budget,
     paperBytes: paperBytes(walk),
-    geometryBytes: walk.renderer?.bytes ?? 0,
+    geometryBytes: picture.renderer.bytes,
     requests: fetcher.requests,
     bytes: fetcher.bytes,
     pending: fetcher.pending,
     complete: walk.complete,
     exact: walk.exact,
     previews: walk.rows.filter((_, t) => previews(walk, t)).length,
-    fps: walk.fps,
+    fps: picture.fps,
     bandwidth: estimate.bandwidth,
     latency: estimate.latency,
-    bufferAge: walk.bufferAge,
+    bufferAge: needs.age,
     policy: walk.policy,
     patience: client.patience.moving,
-    dataSaver: walk.saving,
+    dataSaver: stream.saving,
     levels,
     held: Array.from(memory.held),
   };

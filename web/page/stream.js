@@ -27,6 +27,11 @@ export class Stream {
   shapes = new Map();
   /** Whether files have arrived since the last look. */
   news = false;
+  /** Whether to make no requests at all: texture memory stays unchanged. */
+  frozen = false;
+  /** Whether only visible textures and cells are fetched, to save data, and to compare with full resolution. */
+  saving = false;
+  comparing = false;
   /** @type {Request[]} */
   #queue = [];
   /** @type {Set<Request>} */
@@ -36,6 +41,8 @@ export class Stream {
   /** Previews that could not be decoded. @type {Set<number>} */
   #spoilt = new Set();
   #cannotDecode = false;
+  #geometry;
+  #report;
 
   /**
    * @param {object} parts
@@ -47,15 +54,9 @@ export class Stream {
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
    * @param {import("./net/opening.js").Opening | null} parts.opening
    * @param {Decoders} parts.decoders
-   * @param {() => number} parts.lines of the screen
-   * @param {() => boolean} parts.rests whether to make no more requests
-   * @param {(present: Float64Array) => void} parts.expect receives the columns of textures that the first view
-   *   probably wants
    * @param {(error: PageError, kind: string, number: number) => void} parts.report
    */
-  constructor({
-    site, index, client, locator, estimate, fetcher, opening, decoders, lines, rests, expect, report,
-  }) {
+  constructor({ site, index, client, locator, estimate, fetcher, opening, decoders, report }) {
     this.site = site;
     this.client = client;
     this.locator = locator;
@@ -63,44 +64,47 @@ export class Stream {
     this.fetcher = fetcher;
     this.opening = opening;
     this.workers = decoders.workers;
-    this.geometry = decoders.geometry;
-    this.lines = lines;
-    this.rests = rests;
-    this.expect = expect;
-    this.report = report;
+    this.#geometry = decoders.geometry;
+    this.#report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, this.workers));
     this.previews = previewsOf(index, site.index, this.workers);
-    this.#follow().catch(() => {});
+  }
+
+  /** Whether to make no requests beyond the screen, or none at all. */
+  get rests() {
+    const enough = this.saving || this.comparing || document.hidden;
+    return this.frozen || (enough && this.client.missing(true) === 0);
   }
 
   /**
    * Requests all parts of the opening, in their order, and the previews that its view needs next on this
-   * screen. Until the view itself tells, the textures of its previews are expected in it, those of the first the
-   * most.
+   * screen. Returns the columns of textures that the view probably wants: those of its previews, of the first
+   * the most. Null without an opening.
+   * @param {import("./gl/viewport.js").Viewport} viewport
    */
-  async #follow() {
+  async follow(viewport) {
     const { client: { catalogue: { T, K }, downloads }, fetcher, opening } = this;
-    if (!opening) return;
+    if (!opening) return null;
     fetcher.requests++;
     opening.over.then(() => (fetcher.bytes += opening.bytes));
     const next = await opening.next, present = new Float64Array(T * K);
     /** @type {[import("./policy/downloads.js").Kind, number, number | undefined][]} */
     const steps = opening.parts.map(([kind, number, size]) =>
       [kind, number, kind === "texture" ? size : undefined]);
-    const lines = this.lines();
+    const lines = viewport.across(viewport.angle);
     for (const [number, few] of next) if (lines > few) steps.push(["preview", number, undefined]);
     steps.forEach(([kind, place, end], order) => {
       const preview = kind === "preview";
       const number = preview ? this.previews.findIndex((file) => file.place === place) : place;
       const later = order >= opening.parts.length;
-      if (number < 0 || (later && this.rests()) || !downloads.free(kind, number)) return;
+      if (number < 0 || (later && this.rests) || !downloads.free(kind, number)) return;
       this.ask(downloads.ask(kind, number, steps.length - order, end));
       if (!preview) return;
       const { texture, row: { level } } = this.previews[number];
       const first = texture * K + 1, share = present[first] || 1 / (2 + order);
       present.fill(share, first, first + level + 1);
     });
-    this.expect(present);
+    return present;
   }
 
   /**
@@ -116,7 +120,7 @@ export class Stream {
 
   /** Makes the most urgent requests, as long as the link would run dry. */
   pump() {
-    while (!this.rests()) {
+    while (!this.rests) {
       const request = this.client.next(this.estimate);
       if (!request) return;
       this.ask(request);
@@ -162,7 +166,7 @@ export class Stream {
       const error = known ? fault : new PageError("PTM-V107", String(fault));
       const forGood = error.code === "PTM-V103" || error.code === "PTM-V105";
       client.failed(request, forGood ? Infinity : clock() + REST);
-      this.report(error, kind, number);
+      this.#report(error, kind, number);
     }
   }
 
@@ -210,7 +214,7 @@ export class Stream {
   #shapes(request, cell) {
     const textures = this.site.index.textures.length;
     const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) =>
-      readShapes(body, cell, textures, this.geometry);
+      readShapes(body, cell, textures, this.#geometry);
     return this.#whole(request, read);
   }
 
@@ -288,7 +292,7 @@ export class Stream {
       if (!again) {
         this.#spoilt.add(number);
         const message = fill(page.unshown, { file: file.row.file, reason: fault.message });
-        this.report(new PageError("PTM-V105", message), "preview", number);
+        this.#report(new PageError("PTM-V105", message), "preview", number);
       }
       throw fault;
     }
@@ -298,7 +302,7 @@ export class Stream {
   #reportDecoder(fault) {
     if (this.#cannotDecode || !this.workers.failed) return;
     this.#cannotDecode = true;
-    this.report(new PageError("PTM-V106", fill(page.undecoded, { reason: String(fault) })), "decoder", 0);
+    this.#report(new PageError("PTM-V106", fill(page.undecoded, { reason: String(fault) })), "decoder", 0);
     this.files.forEach((_, t) => this.client.lose(t, 0, Infinity));
   }
 
@@ -327,14 +331,14 @@ export class Stream {
       if (fault.code.startsWith("PTM-L")) {
         this.client.lose(texture, kept, Infinity);
         const message = fill(page.partial, { file: file.row.file, reason: fault.message });
-        this.report(new PageError("PTM-V106", message), "texture", texture);
+        this.#report(new PageError("PTM-V106", message), "texture", texture);
         throw fault;
       }
       file.cut(kept);
       this.client.lose(texture, kept, this.#suspect.get(texture) === level ? Infinity : 0);
       this.#suspect.set(texture, level);
       const message = fill(page.damaged, { file: file.row.file, reason: fault.message });
-      this.report(new PageError("PTM-V105", message), "texture", texture);
+      this.#report(new PageError("PTM-V105", message), "texture", texture);
       throw fault;
     }
   }

@@ -16,41 +16,40 @@ const NEAR = 0.1;
  * @returns {() => void} ends it
  */
 function drawingBoth(walk, look, layer) {
-  const { frame, sharpness } = walk;
-  const own = /** @type {any} */ (walk);
-  let view = { tall: walk.tall, aspect: walk.aspect, lines: sharpness.lines };
-  own.sharpness = { full: true, settle: () => false, get lines() { return view.lines; } };
-  for (const name of /** @type {const} */ (["tall", "aspect"])) {
-    Object.defineProperty(walk, name, { get: () => view[name], configurable: true });
-  }
+  const { frame, viewport } = walk, { tall, aspect, lines } = viewport;
+  let view = { tall, aspect, lines };
+  walk.viewport = Object.create(viewport, {
+    full: { value: true }, settle: { value: () => false },
+    tall: { get: () => view.tall }, aspect: { get: () => view.aspect }, lines: { get: () => view.lines },
+  });
   walk.frame = () => {
-    const { axes, eyes, viewports } = look(), { gl, renderer } = walk;
+    const { axes, eyes, viewports } = look(), { gl, picture, picture: { renderer } } = walk;
     const middle = [0, 1, 2].map((k) => eyes.reduce((sum, { place }) => sum + place[k], 0) / eyes.length);
     const union = unionOf(eyes, { eye: middle, ...headingOf(axes) });
     view = union;
     // The view of the page is chosen from, not drawn.
-    if (renderer) renderer.draw = () => false;
+    renderer.draw = () => false;
     try {
       frame.call(walk, union.pose);
     } finally {
-      Reflect.deleteProperty(renderer ?? {}, "draw");
+      Reflect.deleteProperty(renderer, "draw");
     }
-    if (!renderer || gl.isContextLost()) return;
+    if (gl.isContextLost()) return;
     gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
     gl.enable(gl.SCISSOR_TEST);
     eyes.forEach((eye, k) => {
       const { x, y, width, height } = viewports[k];
       gl.viewport(x, y, width, height);
       gl.scissor(x, y, width, height);
-      renderer.draw(cameraOfEye(eye), walk.drawn, performance.now() / 1000);
+      renderer.draw(cameraOfEye(eye), picture.drawn, performance.now() / 1000);
     });
     gl.disable(gl.SCISSOR_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   };
   return () => {
-    for (const name of ["tall", "aspect", "frame"]) Reflect.deleteProperty(walk, name);
-    walk.sharpness = sharpness;
-    walk.turn();
+    Reflect.deleteProperty(walk, "frame");
+    walk.viewport = viewport;
+    walk.picture.turn();
   };
 }
 
@@ -76,7 +75,7 @@ export async function enterVr(app) {
   try {
     await (/** @type {any} */ (gl)).makeXRCompatible();
     const layer = new (/** @type {any} */ (globalThis)).XRWebGLLayer(session, gl);
-    session.updateRenderState({ baseLayer: layer, depthNear: NEAR, depthFar: walk.far });
+    session.updateRenderState({ baseLayer: layer, depthNear: NEAR, depthFar: walk.viewport.far });
     space = await session.requestReferenceSpace("local-floor").catch(() => null);
     floored = Boolean(space);
     space ??= await session.requestReferenceSpace("local");

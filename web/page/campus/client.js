@@ -1,11 +1,10 @@
 // The client of a campus (docs/formats/campus.md, "A client"): which files come next, and in which detail
 // each object is shown. It decides as `ptmtools_lab.campus.client` does.
 
+import { CAMPUS_MOVE, CAMPUS_NEAREST, CAMPUS_THREADS } from "../policy/constants.js";
+
 /** @typedef {import("./index.js").CampusIndex} CampusIndex */
 /** @typedef {import("./index.js").Preset} Preset */
-
-/** Objects in high detail, downloads at a time, and metres of a move after which objects are sorted anew. */
-export const NEAREST = 8, THREADS = 4, MOVE = 2;
 
 /**
  * Metres from an eye to where the segment from an object's barycentre to it leaves the box; 0 inside.
@@ -53,12 +52,12 @@ export class CampusClient {
   /** The visitor is somewhere; whether objects were sorted. @param {number[]} eye */
   look(eye) {
     const before = this.#sortedAt;
-    if (before && Math.hypot(...eye.map((x, k) => x - before[k])) < MOVE) return false;
+    if (before && Math.hypot(...eye.map((x, k) => x - before[k])) < CAMPUS_MOVE) return false;
     this.#sortedAt = [...eye];
     this.sorts++;
     const far = this.index.objects.map(({ box, barycentre }) => distanceTo(eye, box, barycentre));
     this.order = [...far.keys()].sort((a, b) => far[a] - far[b] || a - b);
-    this.near = this.order.slice(0, NEAREST);
+    this.near = this.order.slice(0, CAMPUS_NEAREST);
     return true;
   }
 
@@ -81,7 +80,7 @@ export class CampusClient {
 
   /** The next file for a free thread, or null: low detail of all objects comes before high detail of any. */
   next() {
-    if (this.#threads.length >= THREADS) return null;
+    if (this.#threads.length >= CAMPUS_THREADS) return null;
     for (const [objects, high] of /** @type {[number[], boolean][]} */ ([[this.begun ? [] : this.order, false], [this.near, true]])) {
       for (const k of objects) {
         const files = high ? this.index.high(k, this.preset) : this.index.low(k);

@@ -2,6 +2,8 @@
 
 /** The longest time that counts, s: a hidden page notices nothing. */
 const LONGEST = 0.5;
+/** Times as long as the last one took, on a machine that draws slowly: it also has to decode. */
+const PAUSE = 2;
 
 export class Fence {
   /** Seconds from a mark to the frame in which it was reached, of the last such mark. */
@@ -18,6 +20,11 @@ export class Fence {
   /** Whether what was drawn before the mark is not complete. */
   get busy() {
     return this.#sync !== null;
+  }
+
+  /** Seconds between pictures of a resting visitor. @param {number} least */
+  pause(least) {
+    return Math.max(least, PAUSE * this.took);
   }
 
   /** Marks the end of a picture. @param {number} now s */

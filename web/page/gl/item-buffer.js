@@ -1,11 +1,9 @@
 // The item buffer: a small picture of the visible textures, lightmaps and levels of detail, read back
 // without waiting, and a second one of placeholders for missing cells.
 
+import { ITEM_PIXELS } from "../policy/constants.js";
 import { Fence } from "./fence.js";
 import { aim, programOf } from "./program.js";
-
-/** Number of pixels for screens of any shape: 80 × 45 on most. */
-const PIXELS = 3600;
 
 /** @typedef {import("./camera.js").Camera} Camera */
 
@@ -24,6 +22,14 @@ export class ItemBuffer {
   #drawn = 0;
   /** @type {number[][]} */
   #pairs = [];
+  #width = 0;
+  #height = 0;
+  #frame;
+  #depth;
+  #colors;
+  #packs;
+  #boxes;
+  #boxArray;
 
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
@@ -31,15 +37,14 @@ export class ItemBuffer {
     this.fence = new Fence(gl);
     this.item = programOf(gl, "item");
     this.placeholder = programOf(gl, "placeholder");
-    this.frame = gl.createFramebuffer();
-    this.depth = gl.createRenderbuffer();
-    this.colors = [gl.createRenderbuffer(), gl.createRenderbuffer()];
-    this.packs = [gl.createBuffer(), gl.createBuffer()];
-    this.boxes = gl.createBuffer();
-    this.boxArray = gl.createVertexArray();
-    this.width = this.height = 0;
-    gl.bindVertexArray(this.boxArray);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.boxes);
+    this.#frame = gl.createFramebuffer();
+    this.#depth = gl.createRenderbuffer();
+    this.#colors = [gl.createRenderbuffer(), gl.createRenderbuffer()];
+    this.#packs = [gl.createBuffer(), gl.createBuffer()];
+    this.#boxes = gl.createBuffer();
+    this.#boxArray = gl.createVertexArray();
+    gl.bindVertexArray(this.#boxArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.#boxes);
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
     gl.bindVertexArray(null);
@@ -53,22 +58,23 @@ export class ItemBuffer {
   /** @param {number} aspect */
   #resize(aspect) {
     const { gl } = this;
-    const height = Math.max(1, Math.round(Math.sqrt(PIXELS / aspect)));
-    const width = Math.max(1, Math.round(PIXELS / height));
-    if (width === this.width && height === this.height) return;
-    Object.assign(this, { width, height });
-    gl.bindRenderbuffer(gl.RENDERBUFFER, this.depth);
+    const height = Math.max(1, Math.round(Math.sqrt(ITEM_PIXELS / aspect)));
+    const width = Math.max(1, Math.round(ITEM_PIXELS / height));
+    if (width === this.#width && height === this.#height) return;
+    this.#width = width;
+    this.#height = height;
+    gl.bindRenderbuffer(gl.RENDERBUFFER, this.#depth);
     gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#frame);
     gl.framebufferRenderbuffer(
-      gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, this.depth,
+      gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, this.#depth,
     );
-    this.colors.forEach((color, k) => {
+    this.#colors.forEach((color, k) => {
       const at = gl.COLOR_ATTACHMENT0 + k;
       gl.bindRenderbuffer(gl.RENDERBUFFER, color);
       gl.renderbufferStorage(gl.RENDERBUFFER, gl.RGBA8, width, height);
       gl.framebufferRenderbuffer(gl.FRAMEBUFFER, at, gl.RENDERBUFFER, color);
-      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
+      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.#packs[k]);
       // Chromium warns if a buffer that is to be read is written again, read or not.
       gl.bufferData(gl.PIXEL_PACK_BUFFER, 4 * width * height, gl.DYNAMIC_COPY);
     });
@@ -76,22 +82,19 @@ export class ItemBuffer {
   }
 
   /**
-   * @param {object} view
-   * @param {Camera} view.camera
-   * @param {number} view.aspect
-   * @param {number} view.lines of the screen
-   * @param {number} view.now s
-   * @param {import("./renderer.js").Drawn[]} view.drawn
-   * @param {{cell: number, box: number[]}[]} view.missing
-   * @param {(texture: number) => number[]} view.sizeOf texels of the finest level, across and down
-   * @param {((camera: Camera) => void) | null} view.probe tests more against the depth of the surfaces
+   * @param {Camera} camera
+   * @param {import("../walk/picture.js").Picture} picture
+   * @param {import("./viewport.js").Viewport} viewport
+   * @param {import("../data/site.js").TextureRow[]} rows of the textures
+   * @param {number} now s
+   * @param {((camera: Camera) => void) | null} probe tests more against the depth of the surfaces
    */
-  draw({ camera, aspect, lines, now, drawn, missing, sizeOf, probe }) {
+  draw(camera, { drawn, missing }, { aspect, lines }, rows, now, probe) {
     const { gl, item } = this;
     this.#resize(aspect);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#frame);
     gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.NONE]);
-    gl.viewport(0, 0, this.width, this.height);
+    gl.viewport(0, 0, this.#width, this.#height);
     gl.disable(gl.BLEND);
     gl.disable(gl.DITHER);
     gl.enable(gl.DEPTH_TEST);
@@ -99,7 +102,7 @@ export class ItemBuffer {
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
     aim(gl, item, camera);
-    gl.uniform1f(item.at.pixels, lines / this.height);
+    gl.uniform1f(item.at.pixels, lines / this.#height);
     /** @type {Map<string, number>} */
     const items = new Map();
     this.#pairs = [];
@@ -111,7 +114,8 @@ export class ItemBuffer {
         (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
         if (!items.has(key)) items.set(key, this.#pairs.push(pair));
         gl.uniform1f(item.at.item, /** @type {number} */ (items.get(key)));
-        gl.uniform2fv(item.at.size, texture < 0 ? [1, 1] : sizeOf(texture));
+        const { width, height } = rows[texture] ?? { width: 1, height: 1 };
+        gl.uniform2f(item.at.size, width, height);
         buffers.draw(batch);
       }
     }
@@ -136,8 +140,8 @@ export class ItemBuffer {
     gl.drawBuffers([gl.NONE, gl.COLOR_ATTACHMENT1]);
     gl.clearBufferfv(gl.COLOR, 1, [0, 0, 0, 0]);
     aim(gl, placeholder, camera);
-    gl.bindVertexArray(this.boxArray);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.boxes);
+    gl.bindVertexArray(this.#boxArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.#boxes);
     const corners = new Float32Array(missing.flatMap(({ box }) => faces(box)));
     gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STREAM_DRAW);
     gl.enable(gl.CULL_FACE);
@@ -153,8 +157,8 @@ export class ItemBuffer {
   #read(k) {
     const { gl } = this;
     gl.readBuffer(gl.COLOR_ATTACHMENT0 + k);
-    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
-    gl.readPixels(0, 0, this.width, this.height, gl.RGBA, gl.UNSIGNED_BYTE, 0);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.#packs[k]);
+    gl.readPixels(0, 0, this.#width, this.#height, gl.RGBA, gl.UNSIGNED_BYTE, 0);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
   }
 
@@ -166,10 +170,10 @@ export class ItemBuffer {
   poll(now) {
     if (!this.fence.reached(now)) return null;
     const { gl } = this;
-    const pixels = this.width * this.height;
+    const pixels = this.#width * this.#height;
     const read = [0, 1].slice(0, this.#second ? 2 : 1).map((k) => {
       const numbers = new Uint16Array(2 * pixels);
-      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
+      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.#packs[k]);
       gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, numbers);
       return numbers;
     });

@@ -3,9 +3,7 @@
 
 import { bestStep } from "../policy/allocation.js";
 import { overheadOf, room } from "../policy/best.js";
-
-/** Least difference of a level, as of those of textures. */
-const LEAST = 0.5;
+import { LEAST_DIFFERENCE } from "../policy/constants.js";
 
 /** @typedef {import("./statues.js").Statues} Statues */
 
@@ -19,7 +17,7 @@ export function bestLevels(wanted, rows, overhead) {
   let best = { density: 0, number: -1, bytes: 0, end: 0 };
   for (const { number, levels, following, finest, share } of wanted) {
     const { ends, differences } = rows[number];
-    const worth = Float64Array.from(ends, (_, k) => share * Math.max(Number(differences?.[k]) || 0, LEAST));
+    const worth = Float64Array.from(ends, (_, k) => share * Math.max(Number(differences?.[k]) || 0, LEAST_DIFFERENCE));
     // The first request brings several levels at once.
     const cost = Float64Array.from(ends, (_, k) => ends[Math.max(k + 1, following) - 1]);
     const paid = levels ? ends[levels - 1] : 0, step = { density: 0, texture: -1, column: 0, preview: -1 };
@@ -42,7 +40,7 @@ export function weighLevels(walk, statues) {
   const beyond = ({ kind, number, begin }) => kind === "texture"
     && begin >= ends[number * K + Math.max(client.target[number], client.column[number])];
   // Where the policy makes no more requests, levels come as without the option.
-  statues.competes = () => walk.policy === "best" && !stream.rests();
+  statues.competes = () => walk.policy === "best" && !stream.rests;
   client.next = (estimate) => {
     if (!statues.competes() || !walk.begun) return next.call(client, estimate);
     while (room(estimate, downloads.waiting)) {

@@ -1,6 +1,7 @@
 // A client on a walk: it keeps account of downloads, and its policy decides from these what should be
 // in texture memory and what to request next (docs/formats/client.md).
 
+import { PATIENCE, PATIENCE_STILL } from "./constants.js";
 import { Downloads } from "./downloads.js";
 import { knownOf, shapesOf } from "./knowledge.js";
 
@@ -60,7 +61,7 @@ export class Client {
     this.cell = -1;
     this.still = false;
     /** How long a level may take under the paper's policy, s: while the eye moves, and is still. */
-    this.patience = { moving: 0.5, still: 20 };
+    this.patience = { moving: PATIENCE, still: PATIENCE_STILL };
     /** @type {Frustum | null} */
     this.frustum = null;
     /** @type {Shares} (T × K) of the screen that wants each column */

@@ -52,7 +52,29 @@ export const ENOUGH_BYTES = 16384;
 export const ENOUGH_SECONDS = 0.25;
 /** Number of latencies in the mean. */
 export const LATENCIES = 8;
+/** Time between choices of a client, s, unless something has arrived. */
+export const LOOK_SECONDS = 0.2;
+/** Pixels of the item buffer of a page, whatever the aspect of its screen: 80 by 45 on most. */
+export const ITEM_PIXELS = 3600;
+/** A visitor stands if this long, s, he has moved and turned no farther than the next two values. */
+export const STILL_SECONDS = 1;
+/** See the value before. */
+export const STILL_METRES = 0.001;
+/** See the values before. */
+export const STILL_DEGREES = 1;
+/** Policy of the paper: greatest time for a level while the eye moves, s. */
+export const PATIENCE = 0.5;
+/** Policy of the paper: greatest time for a level while the eye stands, s. */
+export const PATIENCE_STILL = 20;
 /** Policy of the paper: past motion that is extrapolated, s. */
 export const BEFORE = 0.5;
 /** Policy of the paper: how far ahead, s. */
 export const AHEAD = 2;
+/** Policy gpuii: width of a ring around the eye, m. Narrower rings make worse pictures, wider ones are not better everywhere. */
+export const RING = 8;
+/** Campuses: number of the nearest objects in high detail (the paper's IV). */
+export const CAMPUS_NEAREST = 8;
+/** Campuses: downloads at a time; the paper states none. */
+export const CAMPUS_THREADS = 4;
+/** Campuses: movement of the eye, m, after which objects are sorted again; the paper states none. */
+export const CAMPUS_MOVE = 2;

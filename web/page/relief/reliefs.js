@@ -94,17 +94,15 @@ export class Reliefs {
   #looked = false;
 
   /**
-   * @param {WebGL2RenderingContext} gl
    * @param {import("../walkthrough.js").Walkthrough} walk
-   * @param {(fault: PageError) => void} report
    */
-  constructor(gl, walk, report) {
+  constructor(walk) {
+    const { gl } = walk;
     this.gl = gl;
-    this.report = report;
     this.walk = walk;
     this.program = programOf(gl, "relief", [VERTEX, FRAGMENT]);
     this.bumps = programOf(gl, "bumps", BUMPS);
-    weigh(walk.catalogue, walk.index.textures);
+    weigh(walk.client.catalogue, walk.index.textures);
   }
 
   delete() {
@@ -126,7 +124,7 @@ export class Reliefs {
     const row = this.walk.index.textures[relief];
     if (aligned && frames?.length === needed && row && (needed === 1 || row.relief !== undefined)) return true;
     this.#wrong.add(shape);
-    this.report(new PageError("PTM-V105", fill(objects.relief, { name: shape.name || objects.object })));
+    this.walk.report(new PageError("PTM-V105", fill(objects.relief, { name: shape.name || objects.object })));
     return false;
   }
 
@@ -150,7 +148,7 @@ export class Reliefs {
    */
   advance(drawn, eye, lines) {
     this.#clean();
-    const { gl, walk: { catalogue: { K, levels }, client, present } } = this;
+    const { gl, walk: { client, client: { catalogue: { K, levels } }, needs: { present } } } = this;
     if (!present) return;
     const screen = gl.drawingBufferWidth * gl.drawingBufferHeight;
     let news = false;
@@ -202,8 +200,8 @@ export class Reliefs {
   /** Frees what the cells no longer have. */
   #clean() {
     if (!this.#parts.size) return;
-    const { renderer } = this.walk;
-    const here = new Set([...(renderer?.cells.values() ?? [])].flatMap(({ shapes }) => shapes));
+    const { cells } = this.walk.picture.renderer;
+    const here = new Set([...cells.values()].flatMap(({ shapes }) => shapes));
     for (const shape of this.#parts.keys()) if (!here.has(shape)) this.#drop(shape);
   }
 

@@ -4,6 +4,7 @@
 // eye; and it is of the lowest step there. Normal maps of materials come after all colours. Texture memory is
 // filled with steps in the same order, and the rest of it with the others that are here, the last seen first.
 
+import { RING } from "../policy/constants.js";
 import { lacking, modelled } from "../policy/files.js";
 import { distance, meetsBox } from "../space/frustum.js";
 
@@ -14,8 +15,8 @@ import { distance, meetsBox } from "../space/frustum.js";
 /** @typedef {import("./sets.js").TextureSet} TextureSet */
 /** @typedef {import("./pieces.js").Piece} Piece */
 
-/** Width of a ring, and the nearest distance that counts, metres: as in `ptmtools_lab/policies/whole_files.py`. */
-const RING = 8, NEAR = 0.05;
+/** The nearest distance that counts, metres. */
+const NEAR = 0.05;
 
 /** @implements {Policy} */
 export class Gpuii {

@@ -4,7 +4,6 @@
 // result is there some frames later, and nothing waits.
 
 import { aim, programOf } from "../gl/program.js";
-import { cameraOf } from "../gl/camera.js";
 import { make } from "../ui/elements.js";
 
 /** Farthest markers, m, and the most that are shown. */
@@ -60,10 +59,10 @@ export class Markers {
     this.nameOf = nameOf;
     this.open = open;
     this.root = make("div", { id: "markers" });
-    walk.canvas.after(this.root);
-    walk.probe = (camera) => this.#probe(camera);
-    walk.turn();
-    walk.canvas.addEventListener("webglcontextlost", () => {
+    walk.viewport.canvas.after(this.root);
+    walk.needs.probe = (camera) => this.#probe(camera);
+    walk.picture.turn();
+    walk.viewport.canvas.addEventListener("webglcontextlost", () => {
       this.#program = null;
       this.#queries = [];
     });
@@ -127,9 +126,9 @@ export class Markers {
 
   /** Moves the buttons to the markers that are seen. @param {import("../gl/camera.js").Pose} pose */
   place(pose) {
-    const { walk } = this, { clientWidth: width, clientHeight: height } = walk.canvas;
+    const { walk } = this, { clientWidth: width, clientHeight: height } = walk.viewport.canvas;
     this.#poll();
-    const { eye, turn, lens } = cameraOf(pose, walk.tall, walk.aspect, walk.far);
+    const { eye, turn, lens } = walk.viewport.camera(pose);
     /** @type {Map<number, HTMLButtonElement>} */
     const buttons = new Map();
     for (const { label } of this.#near(eye)) {
@@ -175,8 +174,8 @@ export class Markers {
    * @param {import("../gl/camera.js").Pose} pose @param {number} across @param {number} down
    */
   rayAt(pose, across, down) {
-    const { walk } = this, { clientWidth: width, clientHeight: height } = walk.canvas;
-    const { eye, turn, lens } = cameraOf(pose, walk.tall, walk.aspect, walk.far);
+    const { walk } = this, { clientWidth: width, clientHeight: height } = walk.viewport.canvas;
+    const { eye, turn, lens } = walk.viewport.camera(pose);
     const view = [(2 * across / width - 1) / lens[0], (1 - 2 * down / height) / lens[1], -1];
     // The transpose turns back.
     const ray = [0, 1, 2].map((k) => turn[3 * k] * view[0] + turn[3 * k + 1] * view[1] + turn[3 * k + 2] * view[2]);
@@ -192,7 +191,7 @@ export class Markers {
     this.#queries = [];
     for (const button of this.#buttons.values()) button.remove();
     this.#buttons.clear();
-    this.walk.turn();
+    this.walk.picture.turn();
   }
 
   /**

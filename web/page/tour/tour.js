@@ -23,7 +23,7 @@ const STILL = 6, SHORT = 500;
 export async function attachTour(app, address) {
   const url = new URL(address, document.baseURI).href;
   try {
-    const tour = await app.walk.fetcher.whole(url, (body) => checked(JSON.parse(new TextDecoder().decode(body))));
+    const tour = await app.walk.stream.fetcher.whole(url, (body) => checked(JSON.parse(new TextDecoder().decode(body))));
     addTourStyle();
     return new Tour(app, tour, url);
   } catch (fault) {

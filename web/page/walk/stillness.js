@@ -1,7 +1,6 @@
 // Measures how long the visitor has not moved.
 
-/** Movement within a second that still counts as standing: metres and radians. */
-const STILL = { seconds: 1, metres: 1e-3, radians: 0.0175 };
+import { STILL_DEGREES, STILL_METRES, STILL_SECONDS } from "../policy/constants.js";
 
 /** @typedef {import("./walker.js").Pose} Pose */
 
@@ -16,7 +15,7 @@ export class Stillness {
   takes({ eye, yaw, pitch }, now) {
     const from = this.#from, way = Math.hypot(...eye.map((x, k) => x - from.eye[k]));
     const turn = Math.max(Math.abs(yaw - from.yaw), Math.abs(pitch - from.pitch));
-    if (way > STILL.metres || turn > STILL.radians) {
+    if (way > STILL_METRES || turn > STILL_DEGREES * Math.PI / 180) {
       this.moved = now;
       this.#from = { eye: [...eye], yaw, pitch };
     }
@@ -27,6 +26,6 @@ export class Stillness {
 
   /** Whether the eye has not moved for a second. @param {number} now */
   lasts(now) {
-    return now - this.moved >= STILL.seconds;
+    return now - this.moved >= STILL_SECONDS;
   }
 }

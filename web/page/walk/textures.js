@@ -6,11 +6,11 @@
 export const losses = ({ column, downloads }) => Float64Array.from(column, (k, t) => downloads.loss(t, k));
 
 /** Share of the view of each texture, for the order of uploads. @param {Walkthrough} walk */
-export const shares = ({ present, catalogue: { T, K } }) =>
+export const shares = ({ needs: { present }, client: { catalogue: { T, K } } }) =>
   Float64Array.from({ length: T }, (_, t) => present?.[t * K + 1] ?? 0);
 
 /** Whether no texture in view waits for texels that are here. @param {Walkthrough} walk */
-export function settled({ client, memory, present, catalogue: { K } }) {
+export function settled({ client, client: { catalogue: { K } }, memory, needs: { present } }) {
   return memory.held.every((held, t) => {
     const shows = (/** @type {number} */ k) => present && present[t * K + k] > 0;
     let column = client.column[t];
