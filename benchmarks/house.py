@@ -42,7 +42,7 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (66_210, 333),
+    "ptmtools": (66_350, 334),
     "ptmtools/*.py": (4_110, 26),
     "ptmtools/cells": (8_060, 31),
     "ptmtools/cli": (3_130, 15),
@@ -56,12 +56,12 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/scene": (9_360, 47),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
-    "ptmtools/site": (4_450, 24),
+    "ptmtools/site": (4_590, 25),
     "ptmtools/store": (2_300, 13),
     "ptmtools/texture": (10_100, 44),
     "ptmtools/tour": (1_260, 8),
     "ptmtools/visibility": (960, 6),
-    "ptmtools_lab": (11_291, 61),
+    "ptmtools_lab": (11_141, 60),
     "ptmtools_samples": (8_400, 56),
     "ptmtools_systems": (7_670, 52),
 }

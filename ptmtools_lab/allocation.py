@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.jit import kernel, plain_kernel
-from ptmtools_lab.previews import Previews
+from ptmtools.site.choice import Previews
 
 #: Most exchanges of steps in one choice.
 _EXCHANGES = 8
@@ -163,71 +163,6 @@ def offered(
             else:
                 step[t, k] = best - value
                 source[t, k], value = chosen, best
-
-
-@plain_kernel
-def next_fetch(
-    worth: Floats, ends: Ints, stored: Ints, requested: Ints, busy: Bools, last: Ints,
-    previews: Previews, pending: Bools, overhead: int,
-) -> tuple[float, int, int]:  # fmt: skip
-    """The next bytes of greatest worth: worth per byte, source, and the column that they lead to;
-    (0, -1, 0) if there are none.
-
-    The worth is what they add to the greatest value of the requested sources at a wanted column;
-    that of ranges, at one which the file has, so that its levels follow a preview of finer ones.
-
-    Parameters
-    ----------
-    worth: (R, K). ends: (T, K) bytes up to each column, the finest of them ``stored`` (T,).
-    requested: (T,) bytes requested already. busy: (T,) whether no more ranges may be requested.
-    last: (T,) wanted columns.
-    pending: (P,) whether a preview was requested.
-    overhead: further bytes of a request.
-    """
-    best, source, column = 0.0, -1, 0
-    for t in range(len(requested)):
-        until, exact, value_before, reached = min(last[t], stored[t]), 0.0, 0.0, 0
-        while reached < until and ends[t, reached + 1] <= requested[t]:
-            reached += 1
-            exact += worth[t, reached]
-            value_before = max(value_before, exact)
-        coarse = value_before
-        for p in range(previews.first[t], previews.first[t + 1]):
-            if pending[p]:
-                row, finest = len(requested) + p, previews.column[p]
-                value_before = max(value_before, greatest(worth[row], min(finest, last[t]))[0])
-                coarse = max(coarse, greatest(worth[row], min(finest, until))[0])
-        best_density, row_of_best, to = 0.0, -1, 0
-        if not busy[t]:
-            total = exact - coarse
-            for k in range(reached + 1, until + 1):
-                total += worth[t, k]
-                density = total / max(ends[t, k] - requested[t] + overhead, 1)
-                if total > 0.0 and density >= best_density:
-                    best_density, row_of_best, to = density, t, k
-        for p in range(previews.first[t], previews.first[t + 1]):
-            if pending[p]:
-                continue
-            row = len(requested) + p
-            value, k = greatest(worth[row], min(previews.column[p], last[t]))
-            density = (value - value_before) / max(previews.bytes[p] + overhead, 1)
-            if value > value_before and density >= best_density:
-                best_density, row_of_best, to = density, row, k
-        if best_density > best:
-            best, source, column = best_density, row_of_best, to
-    return best, source, column
-
-
-@plain_kernel
-def greatest(worth: Floats, last: int) -> tuple[float, int]:
-    """The greatest value of the columns of a source (K,) up to ``last``, at least 0, and the finest
-    column that has it."""
-    best, column, total = 0.0, 0, 0.0
-    for k in range(1, last + 1):
-        total += worth[k]
-        if total >= best:
-            best, column = total, k
-    return best, column
 
 
 @plain_kernel

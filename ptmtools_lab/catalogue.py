@@ -6,7 +6,7 @@ The client decides which part it may use, by what has arrived.
 A texture with resident column k holds levels 0 to k − 1: column 0 is nothing. GPUs have no texels
 of three bytes, so RGB counts four; the paper counts three.
 
-A column has several *sources*: the `.ptm`, and previews (`ptmtools_lab.previews`). Tables by source
+A column has several *sources*: the `.ptm`, and previews (`ptmtools.site.choice`). Tables by source
 have a row for each texture, which stands for its exact levels, and then one for each preview.
 
 The pictures of the simulator have all objects as modelled: a coarser mesh (`Meshes`) costs a client
@@ -28,10 +28,10 @@ from ptmtools.output.served import Document, Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.rays import Frustum
 from ptmtools.scene.colors import gradients
+from ptmtools.site.choice import Previews, no_previews, previews_of
 from ptmtools.site.client import GROSS, LEAST_DIFFERENCE, NORMALS, SEEN
 from ptmtools.texture.model import gpu_texel_bytes
 from ptmtools.walk import Browser
-from ptmtools_lab.previews import Previews, no_previews, previews_of
 
 
 @dataclass(frozen=True)
@@ -250,10 +250,7 @@ class Catalogue:
         """(R, K) mean difference that each column of each source removes on pixels that want it, 0
         to 255, less than 0 if its texels are worse than the column before; of normal maps
         `NORMALS` of it."""
-        losses = self.previews.losses(self.ends.shape[1])
-        preview_gains = self.differences[self.previews.texture] - losses
-        preview_gains[np.arange(preview_gains.shape[1]) > self.previews.column[:, None]] = 0.0
-        gains = np.concatenate([self.differences, preview_gains])
+        gains = self.previews.gains(self.differences)
         textures = np.concatenate([np.arange(self.texture_count), self.previews.texture])
         gains[np.isin(textures, self.normals)] *= NORMALS
         return gains

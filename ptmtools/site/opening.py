@@ -46,7 +46,8 @@ from ptmtools.output.served import Served
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import triangles_of
-from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE, NOTHING, OVERHEAD
+from ptmtools.site.choice import next_fetch, previews_of
+from ptmtools.site.client import LEAST_DIFFERENCE, NOTHING, OVERHEAD
 from ptmtools.texture.previews import coarse_levels
 
 #: Pixels of the view, and its aspect.
@@ -140,45 +141,42 @@ def texture_steps(
 ) -> list[OpeningStep]:
     """The steps of a texture, in their order, up to one that shows what the view needs; ``first``
     is the number of its first preview, ``detail``: see `Needs`."""
-    sizes, ends, previews = sizes_of(row), row["ends"], row.get("previews", ())
-    gain = np.append(0, np.cumsum(share * np.maximum(row["differences"], LEAST_DIFFERENCE)))
+    sizes, previews = sizes_of(row), previews_of([row])
     needed = 1 + int(np.flatnonzero(share > FEW * share[0])[-1])
-    exact = min(len(ends), coarse_levels([max(size) for size in sizes]) if previews else needed)
-    # What each source shows: (worth, bytes of its file, kind, number, column).
-    sources: list[tuple[float, int, str, int, int]] = [
-        (float(gain[k]), ends[k - 1], "texture", number, k) for k in range(1, exact + 1)
-    ]
-    fades = np.maximum(share - np.append(share[1:], 0), 0)
-    for place, preview in enumerate(previews):
-        column = preview["level"] + 1
-        error = 0.0 if preview.get("exact") else max(preview["difference"], LEAST_DIFFERENCE)
-        halved = AVERAGING ** (column - np.arange(1, column + 1))
-        lost = float((np.append(fades[: column - 1], share[column - 1]) * error * halved).sum())
-        worth = float(gain[column]) - lost
-        sources.append((worth, preview["bytes"], "preview", first + place, column))
-        if column >= needed:
-            break
+    # No preview is finer than the first that shows what the view needs.
+    count = min(len(previews.column), int(np.searchsorted(previews.column, needed)) + 1)
+    exact = coarse_levels([max(size) for size in sizes]) if len(previews.column) else needed
+    exact = min(exact, len(row["ends"]))
+    differences = np.maximum(row["differences"], LEAST_DIFFERENCE)
+    worth = previews.gains(np.append(0, differences)[None]) * np.append(0, share)
+    ends = np.pad(np.append(0, row["ends"]), (0, len(sizes) - len(row["ends"])), "edge")[None]
+    previews = previews._replace(first=np.array([0, count]))
+    stored, last, asked = np.array([exact]), np.array([len(sizes)]), np.zeros(1, np.int64)
+    pending = np.zeros(len(previews.column), np.bool_)
     steps: list[OpeningStep] = []
-    shown, loaded, present = 0.0, 0, 0
-    while True:
-        best: tuple[float, int, tuple[float, int, str, int, int]] | None = None
-        for source in sources:
-            worth, end, kind, _, _ = source
-            length = end - loaded if kind == "texture" else end
-            if worth <= shown or length <= 0:
-                continue
-            density = (worth - shown) / (length + OVERHEAD)
-            if best is None or density >= best[0]:
-                best = density, length, source
-        if best is None:
-            return steps
-        density, length, (worth, end, kind, place, column) = best
+    present = 0
+    while present < needed:
+        # Exact levels after previews of finer ones would lie before these: see `contents_of`.
+        busy = np.array([present >= exact])
+        density, source, column = next_fetch(
+            worth, ends, stored, asked, busy, last, previews, pending, OVERHEAD
+        )
+        if source < 0:
+            break
         # Half as many lines need one level less.
         lines = math.floor(LINES * 2.0 ** (detail - (len(sizes) - present))) if present else 0
-        steps.append(OpeningStep(kind, place, end, length, density, lines))
-        shown, loaded, present = worth, end if kind == "texture" else loaded, max(present, column)
-        if column >= needed:
-            return steps
+        if source == 0:
+            end = int(ends[0, column])
+            step = OpeningStep("texture", number, end, end - int(asked[0]), density, lines)
+            asked[0] = end
+        else:
+            preview = source - 1
+            end, column = int(previews.bytes[preview]), int(previews.column[preview])
+            step = OpeningStep("preview", first + preview, end, end, density, lines)
+            pending[preview] = True
+        steps.append(step)
+        present = max(present, column)
+    return steps
 
 
 def ordered_steps(

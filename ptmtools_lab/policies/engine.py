@@ -32,6 +32,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.site.choice import next_fetch
 from ptmtools.site.client import (
     BEHIND,
     CONNECTIONS,
@@ -46,7 +47,7 @@ from ptmtools.site.client import (
     RECORD_SHARE,
     STREAMS,
 )
-from ptmtools_lab.allocation import allocate, gather, holes, next_fetch, offered
+from ptmtools_lab.allocation import allocate, gather, holes, offered
 from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.world import World

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools_lab.allocation import allocate, holes, next_fetch, picture
-from ptmtools_lab.previews import no_previews
+from ptmtools.site.choice import next_fetch, no_previews
+from ptmtools_lab.allocation import allocate, holes, picture
 from tests.lab.worlds import SEEDS, any_world
 
 Case = tuple[Floats, Ints, Ints, int]

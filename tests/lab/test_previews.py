@@ -25,16 +25,16 @@ from ptmtools.rendering.lossy import pictures, read_lossy
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import pack_pyramids, read_pyramids
 from ptmtools.rendering.records import Lossy
+from ptmtools.site.choice import Previews, next_fetch, previews_of
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools.texture import decode, encode, read_header
 from ptmtools.walk import read_walk
-from ptmtools_lab.allocation import next_fetch, offered
+from ptmtools_lab.allocation import offered
 from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.engine import _drops
-from ptmtools_lab.previews import Previews, previews_of
 from ptmtools_lab.renderer import FrameRenderer
 from ptmtools_lab.simulation import WalkRun, simulate
 from ptmtools_lab.tables import Drawing, look

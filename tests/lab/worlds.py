@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.rays import Frustum, RayCamera
-from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
+from ptmtools.site.choice import previews_of
+from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE, STILL_SECONDS
 from ptmtools_lab.catalogue import Catalogue, Meshes, Shapes, meshes_of
 from ptmtools_lab.policies import POLICIES
-from ptmtools_lab.previews import previews_of
 from ptmtools_lab.tables import WalkViews
-from ptmtools_lab.track import STILL_SECONDS, Track
+from ptmtools_lab.track import Track
 from ptmtools_lab.world import Parts, World
 
 #: Metres of a room along x, up and along z.

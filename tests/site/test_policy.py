@@ -14,13 +14,13 @@ from hypothesis import example, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.link import Conditions
+from ptmtools.site.choice import Previews, next_fetch, previews_of
 from ptmtools.site.client import PRIOR_BANDWIDTH, PRIOR_LATENCY
-from ptmtools_lab.allocation import allocate, next_fetch
+from ptmtools_lab.allocation import allocate
 from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.client import Estimate
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies.paper import refresh, share_out
-from ptmtools_lab.previews import Previews, previews_of
 from ptmtools_lab.world import World
 from tests.lab.conftest import two_rooms, walk_file, world
 from tests.lab.worlds import SEEDS, any_world, catalogue, raw, standing

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.link import Conditions
+from ptmtools.site.choice import Previews
 from ptmtools.site.client import AVERAGING, BEHIND, HELD_ON, NEAREST
 from ptmtools_lab.allocation import allocate
 from ptmtools_lab.catalogue import Catalogue, Meshes
@@ -19,7 +20,6 @@ from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.engine import EngineClient
-from ptmtools_lab.previews import Previews
 from ptmtools_lab.simulation import simulate
 from ptmtools_lab.world import World
 from tests.web.node import run
