@@ -116,8 +116,7 @@ def check_conservative(
 
     visible = np.zeros((cells.cell_count + 1,) * 2, dtype=np.bool_)  # the last one was dropped
     visible[:-1, :-1] = pvs.to_matrix()
-    draw, eyes = Sampler(cells), _Eyes(cells)
-    blockers = Blockers(structural, cells.root_box)
+    draw, eyes, blockers = Sampler(cells), _Eyes(cells), Blockers(structural, cells.root_box)
     tried = unoccluded = hairlines = drawn = batch = 0
     pairs: dict[tuple[int, int], MissedPair] = {}
     while tried < segments and drawn < PATIENCE * segments:
@@ -140,8 +139,7 @@ def check_conservative(
         for m in missed[share >= 0.5]:
             ends = (int(a[m]), _place(start[m])), (int(b[m]), _place(end[m]))
             (first, first_end), (second, second_end) = sorted(ends)
-            key = first, second
-            pair = pairs.get(key) or MissedPair(key, first_end, second_end, 0)
+            pair = pairs.get(key := (first, second)) or MissedPair(key, first_end, second_end, 0)
             pairs[key] = replace(pair, segments=pair.segments + 1)
         progress(tried, segments, "segments")
     missing = tuple(pairs[pair] for pair in sorted(pairs))
