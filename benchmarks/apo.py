@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 from ptmtools.parallel import open_executor  # noqa: E402
 from ptmtools.pipeline.warm_up import warm_objects  # noqa: E402
 from ptmtools.scene import IngestOptions, ingest  # noqa: E402
-from ptmtools_systems.apo.files import streamed  # noqa: E402
+from ptmtools_systems.apo.files import encode_stream  # noqa: E402
 from ptmtools_systems.apo.making import ApoTexture, make_apo  # noqa: E402
 from ptmtools_systems.apo.model import ApoOptions  # noqa: E402
 
@@ -58,7 +58,7 @@ def measure(file: Path, options: ApoOptions, jobs: int) -> tuple[ApoTexture, flo
 
 def row(name: str, made: ApoTexture, seconds: float, used: float) -> str:
     """Of the table."""
-    size = len(streamed(made.octree.texels, made.octree)[0])
+    size = len(encode_stream(made.octree.texels, made.octree)[0])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     n = made.source
     return (
@@ -69,7 +69,7 @@ def row(name: str, made: ApoTexture, seconds: float, used: float) -> str:
 
 def levels(name: str, made: ApoTexture) -> str:
     """MB of each level, the first seven together as the paper has them."""
-    _, actual = streamed(made.octree.texels, made.octree)
+    _, actual = encode_stream(made.octree.texels, made.octree)
     each = np.diff(actual["ends"], prepend=0) / 1e6
     first = each[:8].sum()
     rest = ", ".join(f"{k} {mb:.2f}" for k, mb in enumerate(each[8:], start=8))

@@ -44,7 +44,7 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.scene.model import Material, Scene  # noqa: E402
 from ptmtools.scene.orientation.main_axes import tolerance_of  # noqa: E402
 from ptmtools.texture import read_image  # noqa: E402
-from ptmtools_systems.apo.making import make_apo, smooth, welded  # noqa: E402
+from ptmtools_systems.apo.making import make_apo, smooth, weld  # noqa: E402
 from ptmtools_systems.apo.model import ApoOptions  # noqa: E402
 from ptmtools_systems.apo.picture import RenderOptions, render as draw_octree  # noqa: E402
 
@@ -167,7 +167,7 @@ def interlaced(folder: Path) -> Image.Image:
 def octree_levels() -> Image.Image:
     """A bust: its triangles, the simplified mesh, and that mesh with levels of the octree."""
     statue = make_statue("bust", StatueOptions(triangles=TRIANGLES))
-    points, triangles = welded(statue.points.astype(np.float64), statue.triangles)
+    points, triangles = weld(statue.points.astype(np.float64), statue.triangles)
     n = len(triangles)
     none = np.zeros(n, np.int32)
     scene = Scene(

@@ -28,11 +28,11 @@ from ptmtools.arrays import Floats  # noqa: E402
 from ptmtools.executor import Executor  # noqa: E402
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify  # noqa: E402
 from ptmtools.texture import EncodeOptions, encode  # noqa: E402
-from ptmtools_systems.apo.files import streamed  # noqa: E402
-from ptmtools_systems.apo.making import octree_around, smooth, welded  # noqa: E402
+from ptmtools_systems.apo.files import encode_stream  # noqa: E402
+from ptmtools_systems.apo.making import octree_around, smooth, weld  # noqa: E402
 from ptmtools_systems.apo.model import ApoOptions  # noqa: E402
-from ptmtools_systems.apo.normal_map import Baking, looked_up, normal_map  # noqa: E402
-from ptmtools_systems.apo.sampling import at  # noqa: E402
+from ptmtools_systems.apo.normal_map import Baking, look_up_normals, normal_map  # noqa: E402
+from ptmtools_systems.apo.sampling import interpolate  # noqa: E402
 from ptmtools_systems.apo.traversal import look_up  # noqa: E402
 
 #: Points at which forms are compared, and sides of the maps as powers of two.
@@ -52,13 +52,13 @@ def mean_angle(shown: Floats, truth: Floats) -> float:
 def rows_of(name: str, triangles: int, faces: int) -> tuple[list[Row], list[Row]]:
     """Name, bytes and error of the levels of the octree, and of the maps."""
     made = make_statue(name, StatueOptions(triangles))
-    points, corners = welded(made.points.astype(np.float64), made.triangles.astype(np.int32))
+    points, corners = weld(made.points.astype(np.float64), made.triangles.astype(np.int32))
     simplified = simplify(Mesh(points, corners), SimplifyOptions(faces)).mesh
     mesh = smooth(simplified.points, simplified.triangles)
-    baking, cube = Baking.of(mesh, points, corners)
-    compared = baking.compared(POINTS)
-    q = at(baking.corner, compared.points)
-    own = at(mesh.normals[mesh.triangles].astype(np.float64), compared.points)
+    baking, cube = Baking.from_mesh(mesh, points, corners)
+    compared = baking.comparison(POINTS)
+    q = interpolate(baking.corner, compared.points)
+    own = interpolate(mesh.normals[mesh.triangles].astype(np.float64), compared.points)
     own /= np.linalg.norm(own, axis=1, keepdims=True)
     print(
         f"\n{name}: {len(corners):,} triangles to {len(mesh.triangles):,}; "
@@ -66,7 +66,7 @@ def rows_of(name: str, triangles: int, faces: int) -> tuple[list[Row], list[Row]
     )
     octree, _ = octree_around(mesh, points, corners, ApoOptions(faces=faces), None, Executor())
     q = (cube.low + cube.side * q - octree.low) / octree.side
-    ends = streamed(octree.texels, octree)[1]["ends"]
+    ends = encode_stream(octree.texels, octree)[1]["ends"]
     levels = [
         (f"octree, {k + 1} levels", end, look_up(octree, q, k + 1).normals)
         for k, end in enumerate(ends)
@@ -76,8 +76,8 @@ def rows_of(name: str, triangles: int, faces: int) -> tuple[list[Row], list[Row]
     for depth in SIDES:
         options = ApoOptions(faces=faces, error=0.0, depth=depth, density=_ALL)
         relief = normal_map(mesh, points, corners, options)
-        uv = at(relief.uv.astype(np.float64), compared.points)
-        shown = looked_up(relief.texels, uv, relief.frame[compared.points.triangle])
+        uv = interpolate(relief.uv.astype(np.float64), compared.points)
+        shown = look_up_normals(relief.texels, uv, relief.frame[compared.points.triangle])
         size = len(encode(relief.texels, EncodeOptions(), threads=2))
         maps.append((f"map, {2**depth}²", size, shown))
     truth = compared.normal

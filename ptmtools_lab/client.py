@@ -111,7 +111,7 @@ class Range:
     end: int
 
 
-class Files:
+class ClientFiles:
     """The files of one kind, with the bytes requested and loaded of each.
 
     Attributes
@@ -173,13 +173,15 @@ class Client(ABC):
         stock = world.catalogue
         self.frame = 0
         self.files = {
-            FileKind.INDEX: Files(FileKind.INDEX, np.array([stock.index_bytes])),
-            FileKind.RECORD: Files(FileKind.RECORD, stock.record_bytes.copy()),
-            FileKind.GEOMETRY: Files(FileKind.GEOMETRY, stock.geometry_bytes.copy()),
-            FileKind.TEXTURE: Files(FileKind.TEXTURE, stock.ends[:, -1]),
-            FileKind.STATISTICS: Files(FileKind.STATISTICS, np.array([stock.statistics_bytes])),
-            FileKind.PREVIEW: Files(FileKind.PREVIEW, stock.previews.bytes.copy()),
-            FileKind.MESH: Files(FileKind.MESH, stock.meshes.bytes.copy()),
+            FileKind.INDEX: ClientFiles(FileKind.INDEX, np.array([stock.index_bytes])),
+            FileKind.RECORD: ClientFiles(FileKind.RECORD, stock.record_bytes.copy()),
+            FileKind.GEOMETRY: ClientFiles(FileKind.GEOMETRY, stock.geometry_bytes.copy()),
+            FileKind.TEXTURE: ClientFiles(FileKind.TEXTURE, stock.ends[:, -1]),
+            FileKind.STATISTICS: ClientFiles(
+                FileKind.STATISTICS, np.array([stock.statistics_bytes])
+            ),
+            FileKind.PREVIEW: ClientFiles(FileKind.PREVIEW, stock.previews.bytes.copy()),
+            FileKind.MESH: ClientFiles(FileKind.MESH, stock.meshes.bytes.copy()),
         }
         self.records, self.geometry = self.files[FileKind.RECORD], self.files[FileKind.GEOMETRY]
         self.textures, self.previews = self.files[FileKind.TEXTURE], self.files[FileKind.PREVIEW]

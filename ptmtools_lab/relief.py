@@ -36,7 +36,8 @@ from ptmtools.site.client import LEAST_DIFFERENCE
 from ptmtools_lab.catalogue import Catalogue, Columns, Shapes, aligned
 from ptmtools_lab.rows import RowSums
 from ptmtools_systems.apo.lighting import depth_of, descend, stop_of
-from ptmtools_systems.apo.served_octrees import Octrees, level_differences
+from ptmtools_systems.apo.model import Octrees
+from ptmtools_systems.apo.served_octrees import level_differences
 
 
 @plain_kernel

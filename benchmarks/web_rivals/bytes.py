@@ -20,7 +20,7 @@ from benchmarks.web_rivals.entrants import Subject, walk_page
 from benchmarks.web_rivals.images import in_form
 from benchmarks.web_rivals.models import whole_glb
 from ptmtools.output.emission import compress
-from ptmtools.site.entry import Entry, link_bytes
+from ptmtools.site.entry import SiteEntry, link_bytes
 
 #: What of a site's data is neither geometry nor texture: first letters of names.
 _PICTURES = ("poster-", "vp-", "icon-")
@@ -77,7 +77,7 @@ def model_weight(subject: Subject) -> Weight:
     return Weight(len(compress(whole_glb(subject.scene))), images)
 
 
-def site_weight(files: Mapping[str, Entry]) -> Weight:
+def site_weight(files: Mapping[str, SiteEntry]) -> Weight:
     """Of a site."""
     total = {"geometry": 0, "images": 0, "rest": 0}
     for name, entry in files.items():
@@ -85,7 +85,7 @@ def site_weight(files: Mapping[str, Entry]) -> Weight:
     return Weight(**total)
 
 
-def _kind(name: str, entry: Entry) -> str:
+def _kind(name: str, entry: SiteEntry) -> str:
     if name.endswith(".glb"):
         return "geometry"
     picture = name.rsplit("/", 1)[-1].startswith(_PICTURES)

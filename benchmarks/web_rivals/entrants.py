@@ -45,7 +45,7 @@ from benchmarks.web_rivals.models import whole_glb
 from benchmarks.web_rivals.optimized import OPTIMIZE, gltf_transform
 from benchmarks.web_rivals.progressive import progressive
 from ptmtools.scene.model import Scene
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 
 PAGES = Path(__file__).with_name("pages")
 #: Files of more bytes are textures for the most part, which gzip does not make smaller.
@@ -84,7 +84,7 @@ class Entrant:
     """
 
     name: str
-    files: Mapping[str, Entry]
+    files: Mapping[str, SiteEntry]
     complete: str = "window.rival?.complete"
     steady: bool = True
 
@@ -209,7 +209,7 @@ _MADE = {
 
 
 def _page(
-    name: str, script: str, files: Mapping[str, Any], entries: list[Entry], subject: Subject
+    name: str, script: str, files: Mapping[str, Any], entries: list[SiteEntry], subject: Subject
 ) -> Entrant:
     """The model is asked for at once, beside the script."""
     settings = json.dumps({"files": files, "view": subject.viewpoint}).replace("<", "\\u003c")
@@ -222,12 +222,12 @@ def _page(
     return Entrant(name, {entry.name: entry for entry in both + entries})
 
 
-def _model(data: bytes) -> Entry:
+def _model(data: bytes) -> SiteEntry:
     return _entry("model.glb", data, "model/gltf-binary", len(data) <= _COMPRESSED)
 
 
-def _entry(name: str, data: bytes, media: str, compressed: bool = False) -> Entry:
-    return Entry(name, data, media, forever=True, compressed=compressed)
+def _entry(name: str, data: bytes, media: str, compressed: bool = False) -> SiteEntry:
+    return SiteEntry(name, data, media, forever=True, compressed=compressed)
 
 
 def _of_three(name: str) -> bytes:

@@ -23,7 +23,7 @@ from urllib.parse import unquote
 
 from benchmarks.web_rivals.link import BUFFER
 from ptmtools.output.emission import compress
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 
 HTTP = ("1.1", "2")
 #: s until it must accept connections.
@@ -121,7 +121,7 @@ def certificate() -> Iterator[Certificate]:
 
 
 @contextmanager
-def nginx(files: Mapping[str, Entry], http: str, own: Certificate) -> Iterator[Server]:
+def nginx(files: Mapping[str, SiteEntry], http: str, own: Certificate) -> Iterator[Server]:
     """Serves files by one of `HTTP`.
 
     Raises SystemExit if it is not installed, RuntimeError with its log if it does not start.
@@ -165,7 +165,7 @@ def running(servers: str, port: int, folder: Path) -> Iterator[Server]:
             process.wait()
 
 
-def _write(files: Mapping[str, Entry], folder: Path) -> None:
+def _write(files: Mapping[str, SiteEntry], folder: Path) -> None:
     for name, entry in files.items():
         path = folder / unquote(name)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -178,7 +178,7 @@ def _write(files: Mapping[str, Entry], folder: Path) -> None:
             path.with_name(f"{path.name}.gz").write_bytes(small)
 
 
-def _types(files: Mapping[str, Entry]) -> dict[str, str]:
+def _types(files: Mapping[str, SiteEntry]) -> dict[str, str]:
     """Media type by suffix."""
     return {name.rsplit(".", 1)[-1]: entry.media for name, entry in files.items() if "." in name}
 

@@ -98,7 +98,7 @@ def many_files(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @dataclass(frozen=True)
-class Job:
+class FileJob:
     """One file that a command works on.
 
     Attributes
@@ -147,14 +147,14 @@ class Shard:
     def __str__(self) -> str:
         return f"{self.number}/{self.count}"
 
-    def jobs(self, jobs: Sequence[Job]) -> list[Job]:
+    def jobs(self, jobs: Sequence[FileJob]) -> list[FileJob]:
         """The jobs of this part: by a digest of the path of each source below the folder that all
         have in common. So a machine may have mounted that folder elsewhere than another, and a
         new file in it changes the part of no other."""
         folders = [os.path.dirname(os.path.abspath(job.source)) for job in jobs if job.source]
         common = os.path.commonpath(folders) if folders else ""
 
-        def part(job: Job) -> int:
+        def part(job: FileJob) -> int:
             name = os.path.relpath(os.path.abspath(job.source), common) if job.source else ""
             digest = sha256(os.fsencode(name.replace(os.sep, "/")))
             return int(digest[:16], 16) % self.count + 1
@@ -184,7 +184,7 @@ def jobs_for(
     output: str | None,
     suffix: str,
     suffixes: Sequence[str],
-) -> list[Job]:
+) -> list[FileJob]:
     """One job for each file of `expand_patterns`.
 
     ``output`` is a folder if it exists as one or ends with a slash, or if the user has ``given``
@@ -201,11 +201,11 @@ def jobs_for(
         raise click.UsageError("standard input (-) must be the only file")
     unique = _once(sources)
     named = [name for name in unique if name]
-    nameless = [Job(name, fault=no_name()) for name in unique if not name]
+    nameless = [FileJob(name, fault=no_name()) for name in unique if not name]
     if output == STANDARD or (output is None and any(map(_streams, named))):
         if len(named) > 1:
             raise click.UsageError("only one file can go to standard output")
-        return nameless + [Job(name) for name in named]
+        return nameless + [FileJob(name) for name in named]
     if output is None:
         return nameless + _make_jobs(
             {name: _output_path(name, None, suffix) for name in named}, None
@@ -227,7 +227,7 @@ def jobs_for(
             None,
             "-o",
         )
-    return nameless + [Job(name, Path(output)) for name in named]
+    return nameless + [FileJob(name, Path(output)) for name in named]
 
 
 def _several(name: str) -> bool:
@@ -269,7 +269,7 @@ def _output_path(name: str, folder: Path | None, suffix: str) -> Path:
     return folder / path.name if folder else path
 
 
-def _make_jobs(targets: dict[str, Path], folder: Path | None) -> list[Job]:
+def _make_jobs(targets: dict[str, Path], folder: Path | None) -> list[FileJob]:
     """A job for each target; with a fault if several sources have it."""
     places: dict[str, list[str]] = {}
     for name, target in targets.items():
@@ -286,7 +286,7 @@ def _make_jobs(targets: dict[str, Path], folder: Path | None) -> list[Job]:
                 file=target,
                 remedy="name one of them alone, or write them into different folders",
             )
-        jobs.append(Job(names[0], target, folder, fault))
+        jobs.append(FileJob(names[0], target, folder, fault))
     return jobs
 
 
@@ -310,8 +310,8 @@ class Batch:
 
     def each(
         self,
-        jobs: Sequence[Job],
-        work: Callable[[Job, int], Report],
+        jobs: Sequence[FileJob],
+        work: Callable[[FileJob, int], Report],
         lines: Callable[[Report], Iterable[str]],
     ) -> tuple[int, list[Report]]:
         """Runs ``work(job, threads)`` for every job, several at a time; a single job has all the
@@ -323,7 +323,7 @@ class Batch:
         self.console.to_stderr = any(job.to_stdout for job in jobs)
         at_once = min(workers, len(jobs))
 
-        def guarded(job: Job) -> Report | Exception:
+        def guarded(job: FileJob) -> Report | Exception:
             if job.fault:
                 return job.fault
             try:

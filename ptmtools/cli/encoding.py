@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from ptmtools.cli.batch import STANDARD, Batch, Job, Report, standard_input
+from ptmtools.cli.batch import STANDARD, Batch, FileJob, Report, standard_input
 from ptmtools.errors import WorkerError, naming
 from ptmtools.executor import _portable
 from ptmtools.files import writing
@@ -54,7 +54,7 @@ class FileCoding:
     batch: Batch
 
 
-def encoded_file(coding: FileCoding, job: Job, threads: int = 1) -> Report:
+def encoded_file(coding: FileCoding, job: FileJob, threads: int = 1) -> Report:
     """Encodes an image file and writes its `.ptm` and its previews; the properties of these.
 
     Raises as `load_image`, `encode_to`, `encode_steps` and `write_with`.
@@ -119,7 +119,7 @@ def _put_previews(target: Path, encoded: EncodedSteps, force: bool) -> Iterator[
 
 
 def encoded_by_cluster(
-    coding: FileCoding, jobs: Sequence[Job], scheduler: str
+    coding: FileCoding, jobs: Sequence[FileJob], scheduler: str
 ) -> Iterator[Report | Exception]:
     """As `encoded_file` of each job, by the workers of a Dask scheduler, which see the files under
     the same paths; yields the failure of a job in its place.
@@ -163,7 +163,7 @@ def _sees(probe: str, _: int) -> bool:
     return os.path.exists(probe)
 
 
-def _encoded_or_fault(coding: FileCoding, job: Job) -> Report | Exception:
+def _encoded_or_fault(coding: FileCoding, job: FileJob) -> Report | Exception:
     """In a worker: the report or the failure of a job."""
     if job.fault:
         return job.fault
@@ -173,7 +173,7 @@ def _encoded_or_fault(coding: FileCoding, job: Job) -> Report | Exception:
         return _portable(fault)
 
 
-def _absolute(job: Job) -> Job:
+def _absolute(job: FileJob) -> FileJob:
     return replace(
         job,
         source=os.path.abspath(job.source),
@@ -182,7 +182,7 @@ def _absolute(job: Job) -> Job:
     )
 
 
-def _as_given(job: Job, report: Report) -> Report:
+def _as_given(job: FileJob, report: Report) -> Report:
     """The report with the names that the user gave."""
     named = report | {"image": job.source, "file": os.fspath(job.target or STANDARD)}
     if job.target and "previews" in report:

@@ -14,7 +14,7 @@ import click
 from ptmtools.cli.batch import (
     STANDARD,
     Batch,
-    Job,
+    FileJob,
     Report,
     Shard,
     ShardOf,
@@ -211,7 +211,7 @@ def decode(
         with naming(output):
             writer(Path(str(output)).suffix)
 
-    def work(job: Job, threads: int) -> Report:
+    def work(job: FileJob, threads: int) -> Report:
         source, target = job.source, job.target
         where = standard_input() if source == STANDARD else source
         with naming(source), open(where, limits=batch.limits, threads=threads) as ptm:

@@ -31,8 +31,8 @@ from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
 from ptmtools.site.conversion import lean_glb, web_texture, without_exact
-from ptmtools.site.entry import Entry
-from ptmtools.site.files import DATA, Files
+from ptmtools.site.entry import SiteEntry
+from ptmtools.site.files import DATA, SiteFiles
 from ptmtools.site.front import Front, SiteOptions as SiteOptions
 from ptmtools.store.folder import DatabaseFolder, damage_error
 from ptmtools.store.layout import SERVED, sha256
@@ -69,7 +69,7 @@ class Site:
     again: makes the site with the tour as it is then; raises as `site_tour`.
     """
 
-    entries: Mapping[str, Entry]
+    entries: Mapping[str, SiteEntry]
     index: Mapping[str, Any]
     notes: tuple[str, ...] = ()
     title: str = ""
@@ -108,7 +108,7 @@ class _Builder:
         self._progress = progress
         self._title = options.title or title_of(folder.path)
         self._digests = folder.manifest.outputs()
-        self._files = Files()
+        self._files = SiteFiles()
 
     def site(self) -> Site:
         """The whole site."""
@@ -142,7 +142,7 @@ class _Builder:
         )
 
         def build_with_tour() -> Site:
-            files = Files(dict(self._files.entries), list(self._files.notes))
+            files = SiteFiles(dict(self._files.entries), list(self._files.notes))
             title = front.add(files)
             return Site(files.entries, index, tuple(files.notes), title, build_with_tour)
 
@@ -201,7 +201,7 @@ class _Builder:
 
     def _texture_form(self, form: SiteTextures) -> str:
         """The URL of the document of the textures in another form."""
-        entries: list[Entry] = [*form.entries.load()(self._served.index, self._place)]
+        entries: list[SiteEntry] = [*form.entries.load()(self._served.index, self._place)]
         self._files.entries |= {entry.name: entry for entry in entries}
         return entries[-1].name.removeprefix(f"{DATA}/")
 
@@ -293,7 +293,7 @@ class _Builder:
             media = _VRML_MEDIA.get(Path(name).suffix)
             if media and name.startswith(f"{SERVED}/"):
                 url = quote(name.removeprefix(f"{SERVED}/"))
-                self._files.entries[url] = Entry(
+                self._files.entries[url] = SiteEntry(
                     url, self._folder.path / name, media, compressed=url.endswith(".wrl")
                 )
 

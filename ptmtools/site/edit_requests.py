@@ -35,7 +35,7 @@ from starlette.responses import JSONResponse, Response
 from ptmtools.errors import DatabaseError, OutputError, PtmError
 from ptmtools.schemas import ShapeError, parse
 from ptmtools.site.editing import StaleError, TourEditor
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.lookup import Lookup
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT, script_file
 from ptmtools.tour.reading import LARGEST
@@ -87,9 +87,9 @@ class Editing:
     def lookup(self, files: Lookup) -> Lookup:
         """The files of the page, with the script of the editor and the sounds of the tour."""
 
-        def find(name: str) -> Entry | None:
+        def find(name: str) -> SiteEntry | None:
             if _FOLDER.fullmatch(name):
-                return Entry(name, script_file(SCRIPT), JAVASCRIPT, compressed=True)
+                return SiteEntry(name, script_file(SCRIPT), JAVASCRIPT, compressed=True)
             return self.editor.media(name) or files(name)
 
         return find

@@ -18,7 +18,7 @@ import numpy as np
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.files import write_bytes
 from ptmtools.pipeline.command import naming_command, open_database
-from ptmtools.site.entry import Entry, stamp_of, state_of
+from ptmtools.site.entry import SiteEntry, stamp_of, state_of
 from ptmtools.site.tours import TourPlacer
 from ptmtools.store.layout import MANIFEST, sha256
 from ptmtools.tour.model import FORMAT, NAME, SCHEMA, Tour
@@ -54,7 +54,7 @@ class TourEditor:
         self.file = self._folder / NAME
         self._lock = Lock()
         #: Sounds and captions by their names below `MEDIA`.
-        self._media: dict[str, Entry] = {}
+        self._media: dict[str, SiteEntry] = {}
         self._open()
         self._refuse_read_only()
         data = self._read()
@@ -201,11 +201,11 @@ class TourEditor:
     def _media_name(self, file: Path, media: str) -> str:
         state = state_of(file.stat())
         name = f"{sha256(repr((str(file), state)).encode())[:16]}{file.suffix.lower()}"
-        entry = Entry(f"{MEDIA}/{name}", file, media, state=state)
+        entry = SiteEntry(f"{MEDIA}/{name}", file, media, state=state)
         self._media[entry.name] = entry
         return name
 
-    def media(self, name: str) -> Entry | None:
+    def media(self, name: str) -> SiteEntry | None:
         """The entry of a sound or of captions that a shown tour names."""
         return self._media.get(name)
 

@@ -24,7 +24,7 @@ def is_marked(name: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Entry:
+class SiteEntry:
     """A file of a site.
 
     Attributes
@@ -72,7 +72,7 @@ def stamp_of(file: Path) -> tuple[int, ...]:
         return ()
 
 
-def link_bytes(entry: Entry) -> int:
+def link_bytes(entry: SiteEntry) -> int:
     """Bytes of a file on the link without headers; of its gzip copy where that is sent."""
     if isinstance(entry.source, Path) and not entry.compressed:
         return entry.source.stat().st_size

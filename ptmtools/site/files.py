@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.site.about import ICONS, MANIFEST, MANIFEST_MEDIA, icon, manifest_of
-from ptmtools.site.entry import DIGITS, Entry, state_of
+from ptmtools.site.entry import DIGITS, SiteEntry, state_of
 from ptmtools.store.folder import damage_error
 from ptmtools.store.layout import sha256
 
@@ -21,13 +21,13 @@ _STRANGE = re.compile(r"[^A-Za-z0-9_-]+")
 
 
 @dataclass
-class Files:
+class SiteFiles:
     """The files so far, by name, and remarks for the user."""
 
-    entries: dict[str, Entry] = field(default_factory=dict)
+    entries: dict[str, SiteEntry] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def put(self, entry: Entry) -> None:
+    def put(self, entry: SiteEntry) -> None:
         """Adds a file under its own name."""
         self.entries[entry.name] = entry
 
@@ -54,7 +54,7 @@ class Files:
         cleaned = _STRANGE.sub("_", stem)[: None if mark else 64]
         name = f"{cleaned}-{(mark or digest)[:DIGITS]}{suffix}"
         state = state_of(source.stat()) if isinstance(source, Path) else None
-        self.put(Entry(f"{DATA}/{name}", source, media, True, compressed, state, digest))
+        self.put(SiteEntry(f"{DATA}/{name}", source, media, True, compressed, state, digest))
         return name
 
     def render(self, draw: Callable[[], T], database: Path) -> T | None:
@@ -71,10 +71,10 @@ class Files:
             raise damage_error(Path(fault.file or database), fault.message) from None
 
 
-def add_manifest(files: Files, title: str) -> None:
+def add_manifest(files: SiteFiles, title: str) -> None:
     """Adds the web application manifest of a site, and its icons."""
     icons = {
         size: f"{DATA}/{files.add(f'icon-{size}', '.png', 'image/png', icon(size))}"
         for size in ICONS
     }
-    files.put(Entry(MANIFEST, manifest_of(title, icons), MANIFEST_MEDIA))
+    files.put(SiteEntry(MANIFEST, manifest_of(title, icons), MANIFEST_MEDIA))

@@ -17,8 +17,8 @@ from ptmtools.files import open_below
 from ptmtools.folder_kinds import FolderKind
 from ptmtools.site.about import About
 from ptmtools.site.content import Site, SiteOptions, title_of
-from ptmtools.site.entry import DIGITS, Entry, link_bytes, state_of
-from ptmtools.site.files import DATA, Files, add_manifest
+from ptmtools.site.entry import DIGITS, SiteEntry, link_bytes, state_of
+from ptmtools.site.files import DATA, SiteFiles, add_manifest
 from ptmtools.site.program import form_page, form_script
 from ptmtools.store.layout import sha256
 
@@ -56,14 +56,14 @@ def form_site(folder: Path, kind: FolderKind, options: SiteOptions | None = None
     place = f"data-{sha256(data)[:DIGITS]}"
     options = options or SiteOptions()
     title = options.title or title_of(folder)
-    files = Files()
-    files.put(Entry(f"{place}/{kind.index}", data, _MEDIA[".json"], True, compressed=True))
+    files = SiteFiles()
+    files.put(SiteEntry(f"{place}/{kind.index}", data, _MEDIA[".json"], True, compressed=True))
     for name in kind.files.load()(index):
         file = folder / name
         _, state = _read(folder, name, 0)
         media = _MEDIA.get(file.suffix, "application/octet-stream")
         packed = file.suffix in (".glb", ".txt")
-        files.put(Entry(f"{place}/{quote(name)}", file, media, True, packed, state))
+        files.put(SiteEntry(f"{place}/{quote(name)}", file, media, True, packed, state))
     script = form_script(kind.script)
     files.put(script)
     settings = {"title": title, "index": f"{place}/{kind.index}"}

@@ -13,8 +13,8 @@ from ptmtools.options import option
 from ptmtools.output.served import Served
 from ptmtools.site.about import About, description_of, folder_of
 from ptmtools.site.catalogue import ANGLE, CatalogueContent, catalogue_of
-from ptmtools.site.entry import Entry
-from ptmtools.site.files import DATA, Files, add_manifest
+from ptmtools.site.entry import SiteEntry
+from ptmtools.site.files import DATA, SiteFiles, add_manifest
 from ptmtools.site.program import (
     HTML,
     add_policy,
@@ -109,7 +109,7 @@ class Front:
     poster: str
     openings: Sequence[str]
 
-    def add(self, files: Files) -> str:
+    def add(self, files: SiteFiles) -> str:
         """Adds the files; returns the title of the page. Raises as `site_tour`; InputError
         PTM-I122: the program is incomplete."""
         program = program_files()
@@ -141,7 +141,7 @@ class Front:
         add_manifest(files, title)
         return title
 
-    def _tour(self, files: Files) -> SiteTour | None:
+    def _tour(self, files: SiteFiles) -> SiteTour | None:
         """The tour, None without one and with one that a visitor would see nothing of."""
         tour, note = site_tour(
             self.folder,
@@ -157,7 +157,7 @@ class Front:
         chosen = {name: {"": text} for name, text in options.items() if text}
         return tour and replace(tour, document=tour.document | chosen)
 
-    def _tour_files(self, tour: SiteTour, title: str, files: Files) -> dict[str, str]:
+    def _tour_files(self, tour: SiteTour, title: str, files: SiteFiles) -> dict[str, str]:
         """Adds the tour and its catalogue; returns the settings of the page for them: their URLs. A
         tour without labels has no catalogue."""
         text = json.dumps(tour.document, ensure_ascii=False, separators=(",", ":")).encode()
@@ -167,10 +167,10 @@ class Front:
             return settings
         pages = catalogue_of(self._catalogue(tour, title, files))
         for name, html in pages.items():
-            files.put(Entry(name, add_policy(html).encode(), HTML, compressed=True))
+            files.put(SiteEntry(name, add_policy(html).encode(), HTML, compressed=True))
         return settings | {"catalogue": next(iter(pages))}
 
-    def _catalogue(self, tour: SiteTour, title: str, files: Files) -> CatalogueContent:
+    def _catalogue(self, tour: SiteTour, title: str, files: SiteFiles) -> CatalogueContent:
         stops: dict[int, Mapping[str, Any]] = {}
         for stop in tour.document["stops"]:
             if "label" in stop:

@@ -18,7 +18,7 @@ from ptmtools.files import leads_inside
 from ptmtools.folder_kinds import folder_kind
 from ptmtools.site.about import MANIFEST, MANIFEST_MEDIA
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.entry import Entry, is_marked, stamp_of
+from ptmtools.site.entry import SiteEntry, is_marked, stamp_of
 from ptmtools.site.forms import form_site
 from ptmtools.site.program import HTML, INDEX, JAVASCRIPT
 from ptmtools.store.layout import MANIFEST as DATABASE, SERVED
@@ -27,7 +27,7 @@ from ptmtools.tour.model import NAME
 from ptmtools.tour.reading import CAPTIONS, SOUNDS
 
 #: The file of a decoded name, or None; raises BlockingIOError for one that will exist later.
-Lookup = Callable[[str], Entry | None]
+Lookup = Callable[[str], SiteEntry | None]
 
 #: Suffix → (media type, whether it is worth compressing).
 _MEDIA = {
@@ -62,7 +62,7 @@ def name_of(path: bytes) -> str | None:
     return name if name.count("/") + 1 == len(steps) and leads_inside(name) else None
 
 
-def entry_lookup(entries: Mapping[str, Entry]) -> Lookup:
+def entry_lookup(entries: Mapping[str, SiteEntry]) -> Lookup:
     """The entries of a site, by their names."""
     return {unquote(name): entry for name, entry in entries.items()}.get
 
@@ -74,7 +74,7 @@ def folder_lookup(folder: Path, *, hashed: bool = False) -> Lookup:
     """
     root = folder.resolve()
 
-    def find(name: str) -> Entry | None:
+    def find(name: str) -> SiteEntry | None:
         try:
             file = (root / name).resolve(strict=True)
             if not (file.is_relative_to(root) and file.is_file()):
@@ -82,7 +82,7 @@ def folder_lookup(folder: Path, *, hashed: bool = False) -> Lookup:
         except (OSError, RuntimeError, ValueError):  # no such file, circular links, a NUL
             return None
         media, compressed = _MEDIA.get(file.suffix.lower(), _OTHER)
-        return Entry(name, file, media, hashed and is_marked(name), compressed)
+        return SiteEntry(name, file, media, hashed and is_marked(name), compressed)
 
     return find
 
@@ -117,7 +117,7 @@ class _Database:
         self._find = entry_lookup(self._site.entries)
         self._others = folder_lookup(path / SERVED)
 
-    def __call__(self, name: str) -> Entry | None:
+    def __call__(self, name: str) -> SiteEntry | None:
         if name == INDEX:
             self._renew()
         return self._find(name) or self._others(name)

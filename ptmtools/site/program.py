@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import InputError
-from ptmtools.site.entry import DIGITS, Entry
+from ptmtools.site.entry import DIGITS, SiteEntry
 from ptmtools.site.words import LANGUAGES, words_of
 from ptmtools.store.layout import sha256
 
@@ -52,7 +52,7 @@ _CHARSET = '<meta charset="utf-8">\n'
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
 
 
-def program_files() -> dict[str, Entry]:
+def program_files() -> dict[str, SiteEntry]:
     """The scripts and the decoder, by their names in `PAGE`, in a folder named by their contents.
 
     Raises InputError: PTM-I122 one is missing.
@@ -60,7 +60,7 @@ def program_files() -> dict[str, Entry]:
     data = {name: _read_built(name) for name in PROGRAM}
     digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
     return {
-        name: Entry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
+        name: SiteEntry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
         for name, media in PROGRAM.items()
     }
 
@@ -95,7 +95,7 @@ def page(
     preload: Sequence[str],
     openings: Mapping[str, Sequence[float]],
     about: Sequence[str] = (),
-) -> Entry:
+) -> SiteEntry:
     """The page, filled in.
 
     Parameters
@@ -127,31 +127,33 @@ def page(
     return _fill(INDEX, settings, script, links, fields)
 
 
-def element() -> Entry:
+def element() -> SiteEntry:
     """The script of ``<ptm-walk>``, for pages that embed the walk; its name never changes."""
-    return Entry(ELEMENT, _read_built(ELEMENT), JAVASCRIPT, compressed=True)
+    return SiteEntry(ELEMENT, _read_built(ELEMENT), JAVASCRIPT, compressed=True)
 
 
-def worker() -> Entry:
+def worker() -> SiteEntry:
     """The service worker; browsers look for a new one under the same name."""
-    return Entry(WORKER, _read_built(WORKER), JAVASCRIPT, compressed=True)
+    return SiteEntry(WORKER, _read_built(WORKER), JAVASCRIPT, compressed=True)
 
 
-def registration(program: Mapping[str, Entry]) -> str:
+def registration(program: Mapping[str, SiteEntry]) -> str:
     """The element of the head that installs the service worker, after the page itself."""
     url = program["register.js"].name
     return f'<script>addEventListener("load", () => import("./{url}"))</script>'
 
 
-def form_script(name: str) -> Entry:
+def form_script(name: str) -> SiteEntry:
     """A script of `FORM_SCRIPTS`, in a folder named by its contents; raises as `program_files`."""
     data = _read_built(name)
-    return Entry(f"viewer-{sha256(data)[:DIGITS]}/{name}", data, JAVASCRIPT, True, compressed=True)
+    return SiteEntry(
+        f"viewer-{sha256(data)[:DIGITS]}/{name}", data, JAVASCRIPT, True, compressed=True
+    )
 
 
 def form_page(
     settings: Mapping[str, Any], script: str, about: Sequence[str], *, framed: bool
-) -> Entry:
+) -> SiteEntry:
     """The page of a single object, filled in; raises as `page`. ``framed``: see `add_policy`."""
     links = [f'<link rel="preload" as="fetch" href="{settings["index"]}" crossorigin>', *about]
     return _fill(FORM_PAGE, settings, script, links, {}, framed=framed)
@@ -165,7 +167,7 @@ def _fill(
     fields: Mapping[str, str],
     *,
     framed: bool = False,
-) -> Entry:
+) -> SiteEntry:
     """A page, filled in."""
     text = json.dumps(settings, ensure_ascii=False, separators=(",", ":"))
     values = {
@@ -177,7 +179,7 @@ def _fill(
         **fields,
     }
     filled = _FIELD.sub(lambda match: values[match[1]], _read_built(template).decode())
-    return Entry(INDEX, add_policy(filled, framed=framed).encode(), HTML, compressed=True)
+    return SiteEntry(INDEX, add_policy(filled, framed=framed).encode(), HTML, compressed=True)
 
 
 def add_policy(page: str, *, framed: bool = False) -> str:

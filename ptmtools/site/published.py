@@ -15,7 +15,7 @@ from ptmtools.options import option
 from ptmtools.output.emission import compress
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import GLB, Site
-from ptmtools.site.entry import Entry, is_marked
+from ptmtools.site.entry import SiteEntry, is_marked
 from ptmtools.site.program import ELEMENT, INDEX
 from ptmtools.store.folder import damage_error, reading_error
 from ptmtools.store.layout import sha256
@@ -74,7 +74,7 @@ def steps_of_removal(
     return [[name for name in step if name.removesuffix(COPY) in now] for step in steps]
 
 
-def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entry]]:
+def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, SiteEntry]]:
     """The files of a site, for a host whose files have no headers, by their names."""
     for name, entry in site.entries.items():
         yield unquote(name), entry
@@ -84,12 +84,12 @@ def plain_files(site: Site, options: PublishOptions) -> Iterator[tuple[str, Entr
             if len(packed) < len(data):
                 yield (
                     f"{unquote(name)}{COPY}",
-                    Entry(f"{name}{COPY}", packed, "application/gzip", entry.forever),
+                    SiteEntry(f"{name}{COPY}", packed, "application/gzip", entry.forever),
                 )
-    yield HEADERS, Entry(HEADERS, _headers(site.entries.values()), "text/plain")
+    yield HEADERS, SiteEntry(HEADERS, _headers(site.entries.values()), "text/plain")
 
 
-def _headers(entries: Iterable[Entry]) -> bytes:
+def _headers(entries: Iterable[SiteEntry]) -> bytes:
     """Types and caching for Netlify and Cloudflare Pages, and who may load the element. Where
     several rules match, Cloudflare joins their values: each address has one rule of each header."""
     rules: dict[str, list[str]] = {}
@@ -114,7 +114,7 @@ def _addresses(name: str) -> list[str]:
     return [f"/{name}"] if stem == name else [f"/{name}", "/" if name == INDEX else f"/{stem}"]
 
 
-def digest_of(entry: Entry) -> str:
+def digest_of(entry: SiteEntry) -> str:
     """The SHA-256 of an entry.
 
     Raises DatabaseError: PTM-D006 it is not the recorded one, PTM-D005 the file cannot be read.

@@ -34,7 +34,7 @@ from ptmtools.output.emitters import is_other_form
 from ptmtools.output.representation import representations_in
 from ptmtools.progress import Progress, silent
 from ptmtools.site.content import Site
-from ptmtools.site.entry import Entry, link_bytes
+from ptmtools.site.entry import SiteEntry, link_bytes
 from ptmtools.site.files import DATA
 from ptmtools.site.program import INDEX, LATER
 from ptmtools.site.published import (
@@ -169,7 +169,7 @@ def _digest_in(root: Path, name: str) -> str | None:
         return file_digest(file)
 
 
-def _write(root: Path, name: str, entry: Entry, digest: str) -> None:
+def _write(root: Path, name: str, entry: SiteEntry, digest: str) -> None:
     """Writes a file whole, or not at all."""
     target = real_place(root, name)
     source = entry.source
@@ -255,7 +255,9 @@ def _is_walked(name: str, used: Collection[str]) -> bool:
     return name == INDEX or (walked and not later)
 
 
-def _room(entries: Mapping[str, Entry], index: Mapping[str, Any], row: Mapping[str, Any]) -> int:
+def _room(
+    entries: Mapping[str, SiteEntry], index: Mapping[str, Any], row: Mapping[str, Any]
+) -> int:
     record = json.loads(entries[f"{DATA}/{row['record']}"].read())
     coarse = sum(_coarse(index["textures"][texture]) for texture in record["textures"][0])
     return int(row["recordBytes"]) + int(row["geometryBytes"]) + coarse

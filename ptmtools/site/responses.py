@@ -25,7 +25,7 @@ from starlette.routing import Route
 
 from ptmtools.files import open_regular
 from ptmtools.output.emission import compress
-from ptmtools.site.entry import FRESH, Entry, state_of
+from ptmtools.site.entry import FRESH, SiteEntry, state_of
 from ptmtools.site.lookup import Lookup, name_of
 from ptmtools.site.throttle import Paced, Throttle, Visits
 from ptmtools.store.layout import sha256
@@ -97,7 +97,9 @@ def app_of(
     return Paced(Starlette(routes=[route]), throttle or Throttle(), visits)
 
 
-def _response(request: Request, entry: Entry, copies: Copies, common: dict[str, str]) -> Response:
+def _response(
+    request: Request, entry: SiteEntry, copies: Copies, common: dict[str, str]
+) -> Response:
     """The response to a request for an existing file; raises as `opened`."""
     asked = request.headers
     file, size, tag = open_entry(entry)
@@ -166,7 +168,7 @@ def accepts_gzip(accept_encoding: str | None) -> bool:
     return chosen.strip("0.") != ""
 
 
-def open_entry(entry: Entry) -> tuple[BinaryIO, int, str]:
+def open_entry(entry: SiteEntry) -> tuple[BinaryIO, int, str]:
     """The bytes of an entry as an open file, their number, and a strong entity tag, of these bytes
     and no others: a name that changes with the content, a hash, or the time of the file.
 

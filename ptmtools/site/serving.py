@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, ClassVar
 from ptmtools.errors import InputError
 from ptmtools.options import option
 from ptmtools.quantities import parse_bandwidth, parse_duration
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.lookup import Lookup, entry_lookup
 from ptmtools.site.throttle import Throttle, Visits
 
@@ -85,7 +85,7 @@ class ServeOptions:
 
 @contextmanager
 def serving(
-    files: Mapping[str, Entry] | Lookup,
+    files: Mapping[str, SiteEntry] | Lookup,
     *,
     host: str = "127.0.0.1",
     port: int = 0,

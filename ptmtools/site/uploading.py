@@ -32,7 +32,7 @@ from ptmtools.output.emission import compress
 from ptmtools.parallel import map_in_order
 from ptmtools.progress import Progress
 from ptmtools.site.content import Site
-from ptmtools.site.entry import FRESH, Entry, state_of
+from ptmtools.site.entry import FRESH, SiteEntry, state_of
 from ptmtools.site.published import (
     LIST,
     Published,
@@ -78,7 +78,7 @@ Rows = dict[str, tuple[ObjectRow, ...]]
 class Item:
     """An object to store: its bytes or file, its headers, its row of the list."""
 
-    entry: Entry
+    entry: SiteEntry
     body: bytes | Path
     headers: Headers
     row: ObjectRow
@@ -167,7 +167,7 @@ def _send(objects: Objects, items: Mapping[str, Item], name: str) -> None:
             raise damage_error(item.body, "it changed while it was copied")
 
 
-def _item(entry: Entry, *, encode: bool) -> Item:
+def _item(entry: SiteEntry, *, encode: bool) -> Item:
     """The object of a file; its contents are checked."""
     digest = digest_of(entry)
     body = entry.source

@@ -37,15 +37,15 @@ from ptmtools_lab.tradeoff.experiment import (
     decibels,
     timed,
 )
-from ptmtools_systems.apo.files import glb_of, streamed
-from ptmtools_systems.apo.making import distinct, make_apo, welded
+from ptmtools_systems.apo.files import encode_stream, glb_of
+from ptmtools_systems.apo.making import distinct, make_apo, weld
 from ptmtools_systems.apo.model import ApoOptions
 from ptmtools_systems.apo.normals import corner_normals
 from ptmtools_systems.apo.traversal import look_up
 from ptmtools_systems.campus.making import levels
-from ptmtools_systems.campus.objects import Part, parts_of
+from ptmtools_systems.campus.objects import ObjectPart, parts_of
 from ptmtools_systems.campus.options import MAX_SAMPLES, CampusOptions
-from ptmtools_systems.campus.textures import jpeg, squared
+from ptmtools_systems.campus.textures import jpeg, square_image
 from ptmtools_systems.interlace.model import InterlaceOptions
 from ptmtools_systems.interlace.steps import stride
 from ptmtools_systems.interlace.writing import interlace
@@ -156,7 +156,7 @@ def prepare_octree(subject: Subject) -> Experiment:
 
 def octree_experiment(scene: Scene) -> Experiment:
     """The experiment of the octree texture of all triangles of a scene."""
-    points, triangles = welded(scene.points, scene.triangles)
+    points, triangles = weld(scene.points, scene.triangles)
     triangles, _ = distinct(triangles)
     rays = ViewerRays.around(points[triangles].reshape(-1, 3))
     truth = look(rays, points, triangles)
@@ -175,7 +175,7 @@ def octree_experiment(scene: Scene) -> Experiment:
         normal = look_up(octree, (place - octree.low) / octree.side).normals
         right = np.einsum("nk,nkx->nx", truth.weight[both], normals[truth.triangle[both]])
         angle = _angles(normal, right)
-        stream, _ = streamed(octree.texels, octree)
+        stream, _ = encode_stream(octree.texels, octree)
         size = float(len(stream) + len(glb_of(mesh)))
         return Measurement(
             seconds=seconds,
@@ -250,7 +250,7 @@ def prepare_coarse(subject: Subject) -> Experiment:
     return coarse_experiment(scene, _largest(scene))
 
 
-def coarse_experiment(scene: Scene, parts: Sequence[Part]) -> Experiment:
+def coarse_experiment(scene: Scene, parts: Sequence[ObjectPart]) -> Experiment:
     """The experiment of the coarse meshes of a campus."""
     defaults = CampusOptions(lightmaps="none")
     meshes = []
@@ -299,7 +299,9 @@ def prepare_light(subject: Subject) -> Experiment:
     return light_experiment(scene, _largest(scene))
 
 
-def light_experiment(scene: Scene, parts: Sequence[Part], limit: int = MAX_SAMPLES) -> Experiment:
+def light_experiment(
+    scene: Scene, parts: Sequence[ObjectPart], limit: int = MAX_SAMPLES
+) -> Experiment:
     """The experiment of the rays of baked light, before it is smoothed; ``limit``: rays of the
     reference."""
     around, defaults = Occluders.from_scene(scene), CampusOptions()
@@ -348,7 +350,7 @@ def jpeg_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
     """The experiment of the quality of a campus's JPEG files, of (h, w, c) images of 8 bits."""
     from PIL import Image
 
-    squares = [squared(_colors(image), JPEG_SIDE) for image in images]
+    squares = [square_image(_colors(image), JPEG_SIDE) for image in images]
 
     def measure(setting: Setting) -> Measurement:
         files, seconds = timed(lambda: [jpeg(s, setting.knobs["quality"]) for s in squares])
@@ -406,7 +408,7 @@ def only(scene: Scene, kept: NDArray[np.bool_]) -> Scene:
     )
 
 
-def _largest(scene: Scene) -> list[Part]:
+def _largest(scene: Scene) -> list[ObjectPart]:
     """The objects of a campus with the most triangles."""
     parts = parts_of(scene, CampusOptions.small)
     return sorted(parts, key=lambda part: -len(part.triangles))[:TRIED]

@@ -18,17 +18,17 @@ from ptmtools.progress import Progress, silent
 from ptmtools_systems.apo.octree import (
     Bounds,
     Codes,
-    Level,
+    OctreeLevel,
     Samples,
-    averaged,
+    average_levels,
     check_count,
     codes_of,
     columns,
     divide,
-    joined,
-    pruned,
+    join_levels,
+    prune,
 )
-from ptmtools_systems.apo.sampling import Points, Source, at, nearest, spread
+from ptmtools_systems.apo.sampling import Points, Source, interpolate, nearest, spread
 
 #: Depths of the cells of blocks: 1/16 of the cube wide, or 1/1024 where a block would be too large.
 DEPTHS = (4, 10)
@@ -56,12 +56,12 @@ class Surface:
             large = edges.max(axis=1) > longest
             done.append((corner[~large], normal[~large]))
             side = edges[large].argmax(axis=1)
-            corner, normal = (_halved(values[large], side) for values in (corner, normal))
+            corner, normal = (_halve(values[large], side) for values in (corner, normal))
         return Surface(*(np.concatenate(part) for part in zip(*done, strict=True)))
 
 
 @dataclass(frozen=True)
-class Work:
+class BlockSource:
     """Data shared by all blocks.
 
     Attributes
@@ -97,51 +97,53 @@ class BlockLevels:
     missed: samples whose rays do not hit the source.
     """
 
-    levels: list[Level]
+    levels: list[OctreeLevel]
     cells: Samples
     missed: int
 
 
-def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[list[Level], float]:
+def build(
+    work: BlockSource, executor: Executor, progress: Progress = silent
+) -> tuple[list[OctreeLevel], float]:
     """The levels of the octree, from the root on, and the share of samples whose rays do not hit
     the source; these have the normals of the simplified mesh.
 
     Raises LimitError PTM-L400: too many texels.
     """
-    work, blocks = divided(work)
+    work, blocks = divide_work(work)
     results, texels = [], 0
-    for done, each in enumerate(executor.each(_block, work, blocks)):
+    for done, block in enumerate(executor.each(_block, work, blocks)):
         progress(done, len(blocks), "casting rays")
-        results.append(each)
-        texels += texel_count(each.levels)
+        results.append(block)
+        texels += texel_count(block.levels)
         check_count(texels)
     progress(len(blocks), len(blocks), "casting rays")
-    cells = Samples(*columns([each.cells for each in results]))
+    cells = Samples(*columns([block.cells for block in results]))
     width = cells.value.shape[1]
     # Cells are divided by their own samples, independently of the levels above.
     above = divide(cells, 0, work.top, work.bounds)
     kept = above[work.top].code if len(above) > work.top else np.zeros(0, np.uint64)
-    below = joined([pruned(each.levels, kept) for each in results], width)
+    below = join_levels([prune(block.levels, kept) for block in results], width)
     levels = [*above[: work.top], *(level for level in below if len(level.code))]
     total = int(cells.count.sum())
-    return averaged(levels), sum(each.missed for each in results) / max(total, 1)
+    return average_levels(levels), sum(block.missed for block in results) / max(total, 1)
 
 
-def _halved(values: Floats, side: Ints) -> Floats:
+def _halve(values: Floats, side: Ints) -> Floats:
     """(2m, 3, 3) corner values of the halves of triangles, cut in the middle of the edges ``side``;
     0 is the first corner's edge."""
-    each = np.arange(len(values))
-    a, b, c = (values[each, (side + k) % 3] for k in range(3))
+    triangle = np.arange(len(values))
+    a, b, c = (values[triangle, (side + k) % 3] for k in range(3))
     middle = (a + b) / 2
     result: Floats = np.stack([a, middle, c, middle, b, c], axis=1).reshape(-1, 3, 3)
     return result
 
 
-def divided(work: Work) -> tuple[Work, list[Block]]:
+def divide_work(work: BlockSource) -> tuple[BlockSource, list[Block]]:
     """The work with cells that are small enough, and its blocks."""
     for depth in DEPTHS:
         work = replace(work, top=min(depth, work.bounds.depth))
-        pairs, samples = _counted(work)
+        pairs, samples = _count_samples(work)
         cells, place = np.unique(pairs[:, 1], return_inverse=True)
         counts = np.bincount(place, samples, len(cells))
         if counts.max() <= MOST:
@@ -159,14 +161,14 @@ def divided(work: Work) -> tuple[Work, list[Block]]:
     ]
 
 
-def _counted(work: Work) -> tuple[Ints, Ints]:
+def _count_samples(work: BlockSource) -> tuple[Ints, Ints]:
     """(p, 2) pairs of a triangle and the code of a cell with samples of it, and (p,) the number of
     samples."""
     corner, bits = work.surface.corner, 3 * work.top
     pairs, counts = [], []
     for chosen in _batches(corner, work.spacing):
         points = spread(corner[chosen], work.spacing)
-        code = codes_of(at(corner[chosen], points), work.top).astype(np.int64)
+        code = codes_of(interpolate(corner[chosen], points), work.top).astype(np.int64)
         both, count = np.unique(chosen[points.triangle] << bits | code, return_counts=True)
         pairs.append(np.stack([both >> bits, both & ((1 << bits) - 1)], axis=1))
         counts.append(count)
@@ -176,39 +178,39 @@ def _counted(work: Work) -> tuple[Ints, Ints]:
 def _batches(corner: Floats, spacing: float) -> Iterator[Ints]:
     """Runs of triangles with about `MOST` samples; thin triangles have those of a row."""
     edges = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
-    each = np.maximum(areas(corner) / spacing**2, edges.max(axis=1) / spacing) + 1
-    run = (np.cumsum(each) // MOST).astype(np.int64)
+    samples = np.maximum(areas(corner) / spacing**2, edges.max(axis=1) / spacing) + 1
+    run = (np.cumsum(samples) // MOST).astype(np.int64)
     yield from np.split(np.arange(len(corner)), np.flatnonzero(np.diff(run)) + 1)
 
 
-def _block(work: Work, block: Block) -> BlockLevels:
+def _block(work: BlockSource, block: Block) -> BlockLevels:
     corner, normal = (v[block.triangles] for v in (work.surface.corner, work.surface.normal))
     points = spread(corner, work.spacing)
-    q = at(corner, points)
+    q = interpolate(corner, points)
     code = codes_of(q, work.bounds.depth)
     cell = (code >> np.uint64(3 * (work.bounds.depth - work.top))).astype(np.int64)
-    here = np.flatnonzero((cell >= block.first) & (cell < block.last))
-    here = here[np.argsort(code[here], kind="stable")]
-    code, q = code[here], q[here]
-    own = _unit(at(normal, Points(points.triangle[here], points.weight[here])))
-    hits = nearest(work.source, q, own)
-    value = _values(work, hits.triangle, hits.weight, own)
+    inner = np.flatnonzero((cell >= block.first) & (cell < block.last))
+    inner = inner[np.argsort(code[inner], kind="stable")]
+    code, q = code[inner], q[inner]
+    direction = _unit(interpolate(normal, Points(points.triangle[inner], points.weight[inner])))
+    hits = nearest(work.source, q, direction)
+    value = _values(work, hits.triangle, hits.weight, direction)
     square = (value[:, 3:] ** 2).sum(axis=1)
     ones = np.ones(len(code), np.int64)
     samples = Samples(code, ones, value, square)
     levels = divide(samples, work.top, work.bounds.depth, work.bounds)
-    return BlockLevels(levels, _summed(samples, work), int((hits.triangle < 0).sum()))
+    return BlockLevels(levels, _sum_by_cell(samples, work), int((hits.triangle < 0).sum()))
 
 
-def _values(work: Work, triangle: Ints, weight: Singles, own: Floats) -> Floats:
+def _values(work: BlockSource, triangle: Ints, weight: Singles, direction: Floats) -> Floats:
     """(n, k) unit normals and colours of the source; without a hit the mesh's own normal and
     mid-grey."""
     hit, source = triangle >= 0, work.source
     result = np.full((len(triangle), 6 if source.paint else 3), 0.5)
-    result[:, :3] = own
+    result[:, :3] = direction
     hit_triangle, share = triangle[hit], weight[hit].astype(np.float64)
     normal = np.einsum("ij,ijk->ik", share, source.normals[hit_triangle].astype(np.float64))
-    result[hit, :3] = _unit(normal, own[hit])
+    result[hit, :3] = _unit(normal, direction[hit])
     if source.paint:
         result[hit, 3:] = source.paint.colors(hit_triangle, share)
     return result
@@ -216,12 +218,12 @@ def _values(work: Work, triangle: Ints, weight: Singles, own: Floats) -> Floats:
 
 def _unit(vectors: Floats, otherwise: Floats | None = None) -> Floats:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    other = np.array([0.0, 1.0, 0.0]) if otherwise is None else otherwise
-    result: Floats = np.where(length > 0, vectors / np.where(length > 0, length, 1), other)
+    fallback = np.array([0.0, 1.0, 0.0]) if otherwise is None else otherwise
+    result: Floats = np.where(length > 0, vectors / np.where(length > 0, length, 1), fallback)
     return result
 
 
-def _summed(samples: Samples, work: Work) -> Samples:
+def _sum_by_cell(samples: Samples, work: BlockSource) -> Samples:
     """The sums of the samples of each cell."""
     cell: Codes = samples.code >> np.uint64(3 * (work.bounds.depth - work.top))
     first = np.flatnonzero(np.diff(cell, prepend=~np.uint64(0)))
@@ -235,6 +237,6 @@ def _summed(samples: Samples, work: Work) -> Samples:
     )
 
 
-def texel_count(levels: list[Level]) -> int:
+def texel_count(levels: list[OctreeLevel]) -> int:
     """Number of texels of an octree."""
     return sum(len(level.code) + int((level.children > 0).sum()) for level in levels)

@@ -26,7 +26,7 @@ from ptmtools_systems.apo.files import (
     NORMALS,
     OBJ,
     Index,
-    inflated,
+    inflate_texels,
     mesh_bytes,
     mesh_of,
     read_index,
@@ -115,7 +115,7 @@ def _check_mesh(folder: Path, index: Index, size: int, findings: Findings) -> No
         findings.add("PTM-D804", MESH, "", f"{count(outside, 'point')} outside of the cube")
 
 
-def _about(deviation: float | None) -> str:
+def _distance_text(deviation: float | None) -> str:
     return "an unknown distance" if deviation is None else f"about {deviation:.3g} m"
 
 
@@ -126,7 +126,7 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
     source, mesh = document["source"], index.mesh
     lines = [
         f"{'mesh':<9} {mesh['faces']:,} faces of {source['triangles']:,}, {size(mesh['bytes'])}; "
-        f"deviates by {_about(source['deviation'])}",
+        f"deviates by {_distance_text(source['deviation'])}",
         f"{'octree':<9} {count(index.levels, 'level')}, {int(index.start[-1]):,} texels, "
         f"{size(4 * int(index.start[-1]) * len(streams))} of texture memory",
         f"{'level':>9} {'texels':>10} {'bytes':>10} {'up to here':>11}",
@@ -169,7 +169,7 @@ def _check_stream(row: Mapping[str, Any], data: bytes, at: Place) -> None:
         less = len(data) < row["ends"][-1]
         at.add("PTM-D710", f"ends {'before' if less else 'after'} the last level")
     try:
-        texels = inflated(data, start, row)
+        texels = inflate_texels(data, start, row)
     except InputError as error:
         at.add("PTM-D710", error.message, error.place or "")
         return

@@ -87,7 +87,7 @@ INDEX, NORMALS, COLORS, MESH, OBJ = "apo.json", "apo.bin", "color.bin", "mesh.gl
 FORM = FolderForm(INDEX, FORMAT, "ptm apo", lambda p: p in (INDEX, NORMALS, COLORS, MESH, OBJ))
 
 
-def streamed(texels: NDArray[np.uint8], octree: Octree) -> tuple[bytes, dict[str, list[int]]]:
+def encode_stream(texels: NDArray[np.uint8], octree: Octree) -> tuple[bytes, dict[str, list[int]]]:
     """The stream of (n, 4) texels of an octree, with the end of each level and checksums."""
     deflate = zlib.compressobj(zlib.Z_BEST_COMPRESSION)
     parts: list[bytes] = []
@@ -110,7 +110,7 @@ def files_of(texture: ApoTexture) -> Iterator[tuple[str, bytes]]:
     wanted = {"normals": (NORMALS, octree.texels), "colors": (COLORS, octree.colors)}
     for channel, (name, texels) in wanted.items():
         if texels is not None:
-            data, levels = streamed(texels, octree)
+            data, levels = encode_stream(texels, octree)
             streams[channel] = {"file": name, **levels}
             yield name, data
     mesh = glb_of(texture.mesh)
@@ -287,10 +287,10 @@ def _texels(
 ) -> NDArray[np.uint8]:
     data = _bytes_of(folder, stream["file"], stream["ends"][levels - 1], whole=False)
     with naming(Path(folder) / stream["file"]):
-        return inflated(data, index.start[: levels + 1], stream)
+        return inflate_texels(data, index.start[: levels + 1], stream)
 
 
-def inflated(data: bytes, start: Ints, stream: Mapping[str, Any]) -> NDArray[np.uint8]:
+def inflate_texels(data: bytes, start: Ints, stream: Mapping[str, Any]) -> NDArray[np.uint8]:
     """(n, 4) texels of the first levels, from the beginning of a stream with "ends" and "crc32".
 
     Raises InputError PTM-I821: it is damaged, or too short.
@@ -324,18 +324,20 @@ def mesh_bytes(folder: str | os.PathLike[str]) -> bytes:
     return _bytes_of(folder, MESH, _MESH_MOST)
 
 
-def _bytes_of(folder: str | os.PathLike[str], name: str, most: int, *, whole: bool = True) -> bytes:
-    """Reads a file, or with ``whole`` False its first ``most`` bytes."""
+def _bytes_of(
+    folder: str | os.PathLike[str], name: str, limit: int, *, whole: bool = True
+) -> bytes:
+    """Reads a file, or with ``whole`` False its first ``limit`` bytes."""
     file = Path(folder) / name
     try:
         with open_below(folder, name) as stream:
-            data = stream.read(most + whole)
+            data = stream.read(limit + whole)
     except OSError as fault:
         raise InputError(
             "PTM-I122", f"cannot be read ({fault.strerror or fault})", file=file, remedy=_AGAIN
         ) from None
-    if len(data) > most:
-        raise LimitError("PTM-L204", f"has more than {most:,} bytes", file=file, remedy=_AGAIN)
+    if len(data) > limit:
+        raise LimitError("PTM-L204", f"has more than {limit:,} bytes", file=file, remedy=_AGAIN)
     return data
 
 

@@ -12,7 +12,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import kernel, plain_kernel
 from ptmtools.rendering.light import AMBIENT, LAMP
 from ptmtools.rendering.records import Sight, Triangles
-from ptmtools_systems.apo.served_octrees import Octrees
+from ptmtools_systems.apo.model import Octrees
 from ptmtools_systems.apo.traversal import child_at
 
 #: Largest coordinate in a unit cube.

@@ -17,7 +17,7 @@ from ptmtools.executor import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene, Space
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
-from ptmtools_systems.apo.blocks import Surface, Work, build
+from ptmtools_systems.apo.blocks import BlockSource, Surface, build
 from ptmtools_systems.apo.model import ApoOptions, Octree
 from ptmtools_systems.apo.normals import corner_normals
 from ptmtools_systems.apo.octree import Bounds, cube_around, octree_of
@@ -80,7 +80,7 @@ def make_apo(
     LimitError: PTM-L400 the octree has too many texels.
     MissingComponentError: PTM-M100 ``method`` needs pymeshlab, which cannot be loaded.
     """
-    points, triangles = welded(scene.points, scene.triangles)
+    points, triangles = weld(scene.points, scene.triangles)
     triangles, kept = distinct(triangles)
     simplified = simplify(
         Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method), progress
@@ -116,14 +116,14 @@ def octree_around(
     """
     cube = cube_around(np.concatenate([points, mesh.points]))
     source = Source(
-        cube.inside(points).astype(np.float32),
+        cube.coordinates(points).astype(np.float32),
         triangles,
         corner_normals(points, triangles).astype(np.float32),
         paint,
     )
-    corner = cube.inside(mesh.points)[mesh.triangles]
+    corner = cube.coordinates(mesh.points)[mesh.triangles]
     surface = Surface(corner, mesh.normals[mesh.triangles].astype(np.float64)).cut_up(_LONGEST)
-    work = Work(
+    work = BlockSource(
         source,
         surface,
         # Samples closer than half a leaf of the greatest depth add nothing.
@@ -154,7 +154,7 @@ def smooth(points: Floats, triangles: NDArray[np.int32]) -> Simple:
     return Simple(points, triangles, normals)
 
 
-def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:
+def weld(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:
     """The same triangles over distinct points."""
     rows = np.ascontiguousarray(points + 0.0).view([("", np.float64)] * 3).ravel()
     _, first, number = np.unique(rows, return_index=True, return_inverse=True)

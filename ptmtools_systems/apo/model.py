@@ -1,9 +1,9 @@
-"""The octree texture and its options."""
+"""The octree texture, its options, and several for kernels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,3 +70,27 @@ class Octree:
     def levels(self) -> int:
         """Number of levels."""
         return len(self.start) - 1
+
+
+class Octrees(NamedTuple):
+    """Concatenated octree textures.
+
+    Attributes
+    ----------
+    texel: (N, 4) uint8. begin: (O + 1,) first texel of each octree.
+    levels: (O,) number of levels.
+    low, side: (O, 3), (O,) lower corner and side of the cubes, metres.
+    of: (m,) int32 octree of each triangle of the surfaces, -1 for none.
+    """
+
+    texel: NDArray[np.uint8]
+    begin: Ints
+    levels: Ints
+    low: Floats
+    side: Floats
+    of: NDArray[np.int32]
+
+    @property
+    def number(self) -> int:
+        """Number of octrees."""
+        return len(self.levels)

@@ -27,7 +27,7 @@ from ptmtools_systems.apo.making import Simple
 from ptmtools_systems.apo.model import ApoOptions
 from ptmtools_systems.apo.normals import corner_normals
 from ptmtools_systems.apo.octree import Cube, cube_around
-from ptmtools_systems.apo.sampling import Points, Source, at, nearest, spacing_for, spread
+from ptmtools_systems.apo.sampling import Points, Source, interpolate, nearest, spacing_for, spread
 
 #: Least and greatest side of a map, texels.
 LEAST, LARGEST = 64, 8192
@@ -75,9 +75,9 @@ def normal_map(
 
     Raises MissingComponentError PTM-M100: xatlas is not installed.
     """
-    baking, _ = Baking.of(mesh, points, triangles)
-    most = min(LARGEST, 2**options.depth, math.sqrt(options.density * len(triangles)))
-    compared = baking.compared(min(_COMPARED, options.density * len(triangles)))
+    baking, _ = Baking.from_mesh(mesh, points, triangles)
+    largest = min(LARGEST, 2**options.depth, math.sqrt(options.density * len(triangles)))
+    compared = baking.comparison(min(_COMPARED, options.density * len(triangles)))
     side = LEAST
     while True:
         atlas = unwrap(
@@ -86,7 +86,7 @@ def normal_map(
         frame = frames(atlas, mesh.points[mesh.triangles])
         texels, missed = baking.texels(atlas, frame, side)
         error = compared.error(atlas, frame, texels)
-        if error <= options.error or 2 * side > most:
+        if error <= options.error or 2 * side > largest:
             return NormalMap(atlas.uv.astype(np.float32), frame, texels, error, missed)
         side *= 2
 
@@ -127,16 +127,18 @@ class Baking:
     normal: Floats
 
     @staticmethod
-    def of(mesh: Simple, points: Floats, triangles: NDArray[np.int32]) -> tuple[Baking, Cube]:
+    def from_mesh(
+        mesh: Simple, points: Floats, triangles: NDArray[np.int32]
+    ) -> tuple[Baking, Cube]:
         """As the arguments of `normal_map`; and the cube."""
         cube = cube_around(np.concatenate([points, mesh.points]))
         source = Source(
-            cube.inside(points).astype(np.float32),
+            cube.coordinates(points).astype(np.float32),
             triangles,
             corner_normals(points, triangles).astype(np.float32),
         )
         normal = mesh.normals[mesh.triangles].astype(np.float64)
-        return Baking(source, cube.inside(mesh.points)[mesh.triangles], normal), cube
+        return Baking(source, cube.coordinates(mesh.points)[mesh.triangles], normal), cube
 
     def texels(
         self, atlas: Atlas, frame: NDArray[np.float32], side: int
@@ -153,9 +155,9 @@ class Baking:
         value = np.zeros((side, side, 3), np.float32)
         value[row, column] = _units(inside, 2)
         full = np.stack([fill(value[..., k], owner >= 0) for k in range(3)], axis=2)
-        return _encoded(_units(full, 2)), 1 - float(met.mean())
+        return _encode(_units(full, 2)), 1 - float(met.mean())
 
-    def compared(self, count: float) -> Compared:
+    def comparison(self, count: float) -> Compared:
         """About ``count`` points of the mesh, with the normals of the source."""
         points = spread(self.corner, spacing_for(self.corner, count))
         normal, met = self._normals(points)
@@ -164,16 +166,17 @@ class Baking:
     def _normals(self, points: Points) -> tuple[Floats, NDArray[np.bool_]]:
         """(n, 3) unit normals of the source at points of the mesh, the mesh's own where it has
         none; and where it has."""
-        result = _units(at(self.normal, points), 2)
-        place = at(self.corner, points)
+        result = _units(interpolate(self.normal, points), 2)
+        place = interpolate(self.corner, points)
         met = np.zeros(len(result), np.bool_)
         for first in range(0, len(result), _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
             hits = nearest(self.source, place[part], result[part])
-            own = np.flatnonzero(hits.triangle >= 0)
-            of = Points(hits.triangle[own], hits.weight[own].astype(np.float64))
-            met[first + own] = True
-            result[first + own] = _units(at(self.source.normals.astype(np.float64), of), 2)
+            hit = np.flatnonzero(hits.triangle >= 0)
+            source = Points(hits.triangle[hit], hits.weight[hit].astype(np.float64))
+            met[first + hit] = True
+            met_normal = interpolate(self.source.normals.astype(np.float64), source)
+            result[first + hit] = _units(met_normal, 2)
         return result, met
 
 
@@ -186,11 +189,13 @@ class Compared:
 
     def error(self, atlas: Atlas, frame: NDArray[np.float32], texels: NDArray[np.uint8]) -> float:
         """Root mean square difference of a map to the source."""
-        shown = looked_up(texels, at(atlas.uv, self.points), frame[self.points.triangle])
+        shown = look_up_normals(
+            texels, interpolate(atlas.uv, self.points), frame[self.points.triangle]
+        )
         return float(np.sqrt(((shown - self.normal) ** 2).sum(axis=1).mean()))
 
 
-def looked_up(texels: NDArray[np.uint8], uv: Floats, frame: NDArray[np.float32]) -> Floats:
+def look_up_normals(texels: NDArray[np.uint8], uv: Floats, frame: NDArray[np.float32]) -> Floats:
     """(n, 3) unit normals of a map at (n, 2) coordinates, with bilinear filtering."""
     side = len(texels)
     place = np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1) * side - 0.5
@@ -205,5 +210,5 @@ def looked_up(texels: NDArray[np.uint8], uv: Floats, frame: NDArray[np.float32])
     return _units(np.einsum("nij,nj->ni", frame_axes(frame), value / 127.5 - 1), 2)
 
 
-def _encoded(value: Floats) -> NDArray[np.uint8]:
+def _encode(value: Floats) -> NDArray[np.uint8]:
     return np.rint(127.5 * (value + 1)).astype(np.uint8)

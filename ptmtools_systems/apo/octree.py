@@ -46,7 +46,7 @@ class Cube:
     low: Floats
     side: float
 
-    def inside(self, points: Floats) -> Floats:
+    def coordinates(self, points: Floats) -> Floats:
         """(n, 3) points in the coordinates of the cube, 0 to less than 1."""
         last = np.nextafter(1.0, 0.0)
         result: Floats = np.clip((points - self.low) / self.side, 0.0, last)
@@ -106,7 +106,7 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class Level:
+class OctreeLevel:
     """The nodes of a level, in the order of their codes.
 
     Attributes
@@ -120,14 +120,14 @@ class Level:
     children: NDArray[np.uint8]
 
 
-def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Level]:
+def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[OctreeLevel]:
     """The levels ``top`` to ``bottom``, with every node of ``top`` that holds samples; the codes of
     these have the depth ``bottom``. Nodes of the last level have no children."""
     below = np.uint64(3 * (bottom - top))
     first = np.flatnonzero(np.diff(samples.code >> below, prepend=~np.uint64(0)))
     begin, end = first, np.append(first[1:], len(samples.code))
     total, count, square = (_running(v) for v in (samples.value, samples.count, samples.square))
-    levels: list[Level] = []
+    levels: list[OctreeLevel] = []
     for depth in range(top, bottom + 1):
         n, sums = count[end] - count[begin], total[end] - total[begin]
         code = samples.code[begin] >> np.uint64(3 * (bottom - depth))
@@ -140,48 +140,50 @@ def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Leve
         edges = _edges(samples.code, code[parted], begin[parted], end[parted], bottom - depth)
         occupied = edges[:, 1:] > edges[:, :-1]
         children[parted] = np.packbits(occupied, axis=1, bitorder="little")[:, 0]
-        levels.append(Level(code, _means(sums, n), children))
+        levels.append(OctreeLevel(code, _means(sums, n), children))
         begin, end = edges[:, :-1][occupied], edges[:, 1:][occupied]
         if not len(begin):
             break
     return levels
 
 
-def averaged(levels: list[Level]) -> list[Level]:
+def average_levels(levels: list[OctreeLevel]) -> list[OctreeLevel]:
     """The levels with each inner node the mean of its children (paper 2, §3.1), normals scaled to
     length 1; from the deepest level up."""
     result = [levels[-1]] if levels else []
     for level in reversed(levels[:-1]):
         inner = level.children > 0
-        each = popcount(level.children[inner])
-        first = np.cumsum(each) - each
+        child_count = popcount(level.children[inner])
+        first = np.cumsum(child_count) - child_count
         value = level.value.copy()
         if inner.any():
             below = np.add.reduceat(result[0].value.astype(np.float64), first, axis=0)
-            value[inner] = _means(below, each, otherwise=level.value[inner])
-        result.insert(0, Level(level.code, value, level.children))
+            value[inner] = _means(below, child_count, otherwise=level.value[inner])
+        result.insert(0, OctreeLevel(level.code, value, level.children))
     return result
 
 
-def pruned(levels: list[Level], kept: Codes) -> list[Level]:
+def prune(levels: list[OctreeLevel], kept: Codes) -> list[OctreeLevel]:
     """The parts of levels below the nodes ``kept``, sorted, of the first one."""
     result = []
     for k, level in enumerate(levels):
         root = level.code >> np.uint64(3 * k)
         at = np.minimum(np.searchsorted(kept, root), max(len(kept) - 1, 0))
-        here = kept[at] == root if len(kept) else np.zeros(len(root), dtype=bool)
-        result.append(Level(level.code[here], level.value[here], level.children[here]))
+        below = kept[at] == root if len(kept) else np.zeros(len(root), dtype=bool)
+        result.append(OctreeLevel(level.code[below], level.value[below], level.children[below]))
     return result
 
 
-def joined(parts: list[list[Level]], width: int) -> list[Level]:
+def join_levels(parts: list[list[OctreeLevel]], width: int) -> list[OctreeLevel]:
     """Joins levels of parts that follow each other in the order of codes."""
-    empty = Level(np.zeros(0, np.uint64), np.zeros((0, width), np.float32), np.zeros(0, np.uint8))
+    empty = OctreeLevel(
+        np.zeros(0, np.uint64), np.zeros((0, width), np.float32), np.zeros(0, np.uint8)
+    )
     rows = itertools.zip_longest(*parts, fillvalue=empty)
-    return [Level(*columns(row)) for row in rows]
+    return [OctreeLevel(*columns(row)) for row in rows]
 
 
-def columns(rows: Sequence[Level] | Sequence[Samples]) -> Iterator[NDArray[Any]]:
+def columns(rows: Sequence[OctreeLevel] | Sequence[Samples]) -> Iterator[NDArray[Any]]:
     """The joined arrays of records, attribute by attribute."""
     return map(np.concatenate, zip(*(vars(row).values() for row in rows), strict=True))
 
@@ -221,11 +223,11 @@ def _means(sums: Floats, n: Ints, otherwise: Singles | None = None) -> Singles:
     return result
 
 
-def _edges(codes: Codes, node: Codes, begin: Ints, end: Ints, left: int) -> Ints:
-    """(m, 9) boundaries of the samples of each child of nodes; ``left`` levels are below."""
+def _edges(codes: Codes, node: Codes, begin: Ints, end: Ints, remaining: int) -> Ints:
+    """(m, 9) boundaries of the samples of each child of nodes; ``remaining`` levels are below."""
     if not len(node):
         return np.zeros((0, 9), np.int64)
-    shift = np.uint64(3 * (left - 1)) if left else np.uint64(0)
+    shift = np.uint64(3 * (remaining - 1)) if remaining else np.uint64(0)
     children = np.arange(1, 8).astype(np.uint64)
     child = (node[:, None] << np.uint64(3)) + children
     inner = np.searchsorted(codes, child << shift)
@@ -252,7 +254,7 @@ def check_count(texels: int) -> None:
         )
 
 
-def octree_of(levels: list[Level], cube: Cube) -> Octree:
+def octree_of(levels: list[OctreeLevel], cube: Cube) -> Octree:
     """The octree texture of levels, from the root on.
 
     Raises LimitError PTM-L400: too many texels.
@@ -273,8 +275,8 @@ def octree_of(levels: list[Level], cube: Cube) -> Octree:
             colors[at, 3] = 255
         if inner[k].any():
             children = level.children[inner[k]]
-            each = popcount(children)
-            first = np.cumsum(each) - each
+            child_count = popcount(children)
+            first = np.cumsum(child_count) - child_count
             below = inner[k + 1]
             address = start[k + 1] + addresses(below)[first]
             flags = np.zeros((len(children), 8), bool)
@@ -317,8 +319,8 @@ def fault_of(octree: Octree) -> tuple[str, str] | None:
         if (flags & ~present).any():
             return f"level {k}", "a missing child is marked as an inner node"
         below = flags[present]
-        each = popcount(children)
-        first = start[k + 1] + addresses(below)[np.cumsum(each) - each]
+        child_count = popcount(children)
+        first = start[k + 1] + addresses(below)[np.cumsum(child_count) - child_count]
         if (pointer[:, :3].astype(np.int64) @ _BYTE != first).any():
             return f"level {k}", "an address does not point to the first child"
         if k == octree.levels - 1:

@@ -18,7 +18,7 @@ from ptmtools.folder_kinds import FolderPicture
 from ptmtools.options import option, require_ranges
 from ptmtools.quantities import count
 from ptmtools_systems.apo.model import Octree
-from ptmtools_systems.apo.view import FIELD_OF_VIEW, Frame, Look, view_of
+from ptmtools_systems.apo.view import FIELD_OF_VIEW, Look, OctreePicture, view_of
 
 #: Most pixels of a side.
 WIDEST = 4096
@@ -75,7 +75,7 @@ def render(
     triangles: NDArray[np.integer],
     options: RenderOptions = RenderOptions(),
     normals: Floats | None = None,
-) -> Frame:
+) -> OctreePicture:
     """A picture of the simplified mesh of (P, 3) points and (T, 3) triangles, in its own units;
     ``normals`` (P, 3) are its own (else `corner_normals`), which are displayed without levels.
 
@@ -97,12 +97,12 @@ def render(
     view = replace(view, eye=eye, target=target)
     available = octree.levels if options.levels is None else min(options.levels, octree.levels)
     corners = ((points - octree.low) / octree.side)[triangles]
-    own = np.zeros_like(corners)
+    normal = np.zeros_like(corners)
     if available == 0:
         from ptmtools_systems.apo.normals import corner_normals
 
-        own = corner_normals(points, triangles) if normals is None else normals[triangles]
-    mesh = octree, corners, own, view, Look(available, options.what)
+        normal = corner_normals(points, triangles) if normals is None else normals[triangles]
+    mesh = octree, corners, normal, view, Look(available, options.what)
     if options.backend != "embree":
         from ptmtools_systems.apo import shader
 

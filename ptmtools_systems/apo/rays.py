@@ -14,13 +14,15 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.embree import ray_tree
 from ptmtools_systems.apo.model import Octree
 from ptmtools_systems.apo.traversal import look_up, stop_depth
-from ptmtools_systems.apo.view import Frame, Look, View
+from ptmtools_systems.apo.view import Look, OctreePicture, OctreeView
 
 #: Rays cast at a time.
 _RAYS = 1 << 18
 
 
-def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
+def draw(
+    octree: Octree, corners: Floats, normal: Floats, view: OctreeView, look: Look
+) -> OctreePicture:
     """See `shader.draw`; Embree has float32, which suffices in the cube."""
     shape = (view.height, view.width)
     row, column = (k.ravel() for k in np.indices(shape))
@@ -34,14 +36,14 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
     def place(right: Ints, down: Ints) -> Floats:
         """(n, 3) intersections of the triangles' planes with the rays of pixels."""
         ray = view.rays(right, down)
-        far = reach / (ray * across).sum(axis=1)
-        return np.asarray(view.eye + far[:, None] * ray)
+        distance = reach / (ray * across).sum(axis=1)
+        return np.asarray(view.eye + distance[:, None] * ray)
 
     with np.errstate(divide="ignore", invalid="ignore"):
         q = place(column, row)
         away = [
-            np.linalg.norm(place(*other) - q, axis=1)
-            for other in ((column ^ 1, row), (column, row ^ 1))
+            np.linalg.norm(place(*neighbour) - q, axis=1)
+            for neighbour in ((column ^ 1, row), (column, row ^ 1))
         ]
         stop = stop_depth(np.nan_to_num(np.fmin(*away), nan=1.0, posinf=1.0))
     address, depths, places = np.full(shape, -2), np.zeros(shape, np.int64), np.zeros((*shape, 3))
@@ -51,11 +53,14 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
         nodes = look_up(octree, q, look.levels, stop)
         normals, at = nodes.normals, nodes.address
     else:
-        normals, at = _interpolated(corners[triangle], own[triangle], q), np.full(len(q), -1)
+        normals, at = (
+            _interpolate_normals(corners[triangle], normal[triangle], q),
+            np.full(len(q), -1),
+        )
     colors = octree.colors[at] if octree.colors is not None and look.levels else None
-    picture[row, column] = np.rint(255 * look.shown(normals, colors, view))
+    picture[row, column] = np.rint(255 * look.shade(normals, colors, view))
     address[row, column], depths[row, column], places[row, column] = at, stop, q
-    return Frame(picture, address, places, depths, f"Embree (embreex {version('embreex')})")
+    return OctreePicture(picture, address, places, depths, f"Embree (embreex {version('embreex')})")
 
 
 def _first_hits(corners: Floats, eye: Floats, rays: Floats) -> Ints:
@@ -71,7 +76,7 @@ def _first_hits(corners: Floats, eye: Floats, rays: Floats) -> Ints:
     return result
 
 
-def _interpolated(corners: Floats, normals: Floats, places: Floats) -> Floats:
+def _interpolate_normals(corners: Floats, normals: Floats, places: Floats) -> Floats:
     """(n, 3) unit normals at places (n, 3) in the planes of triangles, from the corners (n, 3, 3)
     of these and their normals (n, 3, 3)."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

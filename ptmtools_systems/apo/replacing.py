@@ -1,4 +1,4 @@
-"""Replaces objects of a building by simplified meshes, and makes octrees of their normals.
+"""Replaces objects of a building by simplified meshes, and makes octrees or maps of their normals.
 
 The mesh is simplified with its materials, sides, texture coordinates and colours, whose borders
 stay. Points that leave the box of the object are moved back into it. Each new triangle stands for
@@ -20,13 +20,15 @@ from ptmtools.cells.roles import matches
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import LimitError
 from ptmtools.executor import Executor
+from ptmtools.output.object_maps import ObjectMaps
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
 from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
 from ptmtools.store.archive import Stored
-from ptmtools_systems.apo.making import distinct, octree_around, smooth, welded
+from ptmtools_systems.apo.making import distinct, octree_around, smooth, weld
 from ptmtools_systems.apo.model import ApoOptions, Octree
+from ptmtools_systems.apo.normal_map import NormalMap, normal_map
 from ptmtools_systems.apo.options import ReplaceOptions
 
 
@@ -50,7 +52,7 @@ class Replacement:
     uv: Floats
     colors: NDArray[np.uint8] | None = None
 
-    def of(self, scene: Scene) -> Scene:
+    def apply_to(self, scene: Scene) -> Scene:
         """The scene with these triangles; unused points are dropped.
 
         Raises ValueError if they do not fit the scene.
@@ -112,12 +114,12 @@ class Replacement:
         stored = Stored(arrays)
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
-        n, most = len(triangles), np.iinfo(np.int32).max
+        n, highest = len(triangles), np.iinfo(np.int32).max
         result = Replacement(
-            stored.indices("objects", np.int32, None, high=most),
+            stored.indices("objects", np.int32, None, high=highest),
             points,
             triangles,
-            stored.indices("source", np.int32, n, high=most),
+            stored.indices("source", np.int32, n, high=highest),
             stored.array("uv", np.float64, n, 3, 2, finite=True),
             stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
         )
@@ -126,7 +128,7 @@ class Replacement:
         return result
 
 
-def joined(parts: list[Replacement]) -> Replacement:
+def join_replacements(parts: list[Replacement]) -> Replacement:
     """Joins replacements of different objects of one scene."""
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     source = np.concatenate([part.source for part in parts])
@@ -175,7 +177,7 @@ class ReplacedObject:
 
 @dataclass(frozen=True)
 class Replaced:
-    """The result of `replaced`.
+    """The result of `replace_objects`.
 
     Attributes
     ----------
@@ -191,7 +193,7 @@ class Replaced:
     notes: tuple[str, ...]
 
 
-def replaced(
+def replace_objects(
     scene: Scene, options: ReplaceOptions, executor: Executor, progress: Progress = silent
 ) -> Replaced:
     """The scene with the objects of certain names replaced.
@@ -210,7 +212,7 @@ def replaced(
     light = [i for i in chosen if len(triangles[i]) <= options.apo_faces]
     parts, objects = [], []
     for i in (i for i in chosen if i not in set(light)):
-        simplified, part = _simplified(scene, i, triangles[i], options.apo_faces, progress)
+        simplified, part = _simplify(scene, i, triangles[i], options.apo_faces, progress)
         notes += [f"{scene.objects[i]}: {note}" for note in simplified.notes]
         if not 0 < len(part.source) < len(triangles[i]):
             notes.append(f"{scene.objects[i]} stays as modelled: it cannot have fewer triangles")
@@ -229,15 +231,15 @@ def replaced(
         stay = _unchanged_note([scene.objects[i] for i in light], options.apo_faces)
         notes.append(stay if parts else Warned(stay))
     notes += [
-        f"{each.name}: from {each.missed:.1%} of the samples nothing of the original was found; "
-        "there the octree has the normals of the simplified mesh"
-        for each in objects
-        if each.missed > _MISSED
+        f"{replaced.name}: from {replaced.missed:.1%} of the samples nothing of the original was "
+        "found; there the octree has the normals of the simplified mesh"
+        for replaced in objects
+        if replaced.missed > _MISSED
     ]
     if not parts:
         return Replaced(scene, None, (), tuple(notes))
-    replacement = joined(parts)
-    return Replaced(replacement.of(scene), replacement, tuple(objects), tuple(notes))
+    replacement = join_replacements(parts)
+    return Replaced(replacement.apply_to(scene), replacement, tuple(objects), tuple(notes))
 
 
 def _by_object(scene: Scene, chosen: Sequence[int]) -> dict[int, Ints]:
@@ -258,22 +260,22 @@ def _unchanged_note(names: Sequence[str], faces: int) -> str:
     )
 
 
-def _simplified(
-    scene: Scene, number: int, own: Ints, faces: int, progress: Progress
+def _simplify(
+    scene: Scene, number: int, members: Ints, faces: int, progress: Progress
 ) -> tuple[Simplified, Replacement]:
-    """The simplified mesh of the object with the triangles ``own``."""
+    """The simplified mesh of the object with the triangles ``members``."""
     phase = f"simplifying {scene.objects[number]}"
-    used, corners = np.unique(scene.triangles[own], return_inverse=True)
-    points, material = scene.points[used], scene.triangle_material[own]
+    used, corners = np.unique(scene.triangles[members], return_inverse=True)
+    points, material = scene.points[used], scene.triangle_material[members]
     images = np.array([m.image for m in scene.materials])
     painted = bool((images[material] >= 0).any())
     mesh = Mesh(
         points,
         corners.reshape(-1, 3).astype(np.int32),
         # A change of sides is a border, like one of materials.
-        (2 * material + scene.two_sided[own]).astype(np.int32),
-        scene.uv[own] if painted else None,
-        None if scene.colors is None else scene.colors[own],
+        (2 * material + scene.two_sided[members]).astype(np.int32),
+        scene.uv[members] if painted else None,
+        None if scene.colors is None else scene.colors[members],
     )
     simplified = simplify(
         mesh, SimplifyOptions(faces), lambda done, total, _: progress(done, total, phase)
@@ -284,7 +286,7 @@ def _simplified(
         np.array([number], np.int32),
         np.clip(result.points, points.min(axis=0), points.max(axis=0)),
         result.triangles,
-        own[simplified.source].astype(np.int32),
+        members[simplified.source].astype(np.int32),
         uv,
         result.colors,
     )
@@ -300,17 +302,17 @@ def apo_options(options: ReplaceOptions) -> ApoOptions:
     )
 
 
-def mesh_of(scene: Scene, own: Ints) -> tuple[Floats, NDArray[np.int32]]:
-    """Distinct points, and the triangles ``own`` of a scene between them, of which those in one
+def mesh_of(scene: Scene, faces: Ints) -> tuple[Floats, NDArray[np.int32]]:
+    """Distinct points, and the triangles ``faces`` of a scene between them, of which those in one
     place count once."""
-    used, corners = np.unique(scene.triangles[own], return_inverse=True)
-    points, triangles = welded(scene.points[used], corners.reshape(-1, 3).astype(np.int32))
+    used, corners = np.unique(scene.triangles[faces], return_inverse=True)
+    points, triangles = weld(scene.points[used], corners.reshape(-1, 3).astype(np.int32))
     return points, distinct(triangles)[0]
 
 
 def _object(
     scene: Scene,
-    own: Ints,
+    faces: Ints,
     simplified: Simplified,
     part: Replacement,
     options: ReplaceOptions,
@@ -319,14 +321,14 @@ def _object(
 ) -> ReplacedObject:
     """An object, with the octree of its normals around its replacement if the options ask for
     one."""
-    number, faces = int(part.objects[0]), len(part.triangles)
+    number, count = int(part.objects[0]), len(part.triangles)
     name = scene.objects[number]
     if options.relief != "octree":
-        return ReplacedObject(number, name, None, len(own), faces, simplified.error, 0.0)
+        return ReplacedObject(number, name, None, len(faces), count, simplified.error, 0.0)
     try:
         octree, missed = octree_around(
             smooth(part.points, part.triangles),
-            *mesh_of(scene, own),
+            *mesh_of(scene, faces),
             apo_options(options),
             None,
             executor,
@@ -336,4 +338,33 @@ def _object(
         fault.place = name
         fault.remedy = "use a greater --apo-error, a smaller --apo-depth or --apo-density"
         raise
-    return ReplacedObject(number, name, octree, len(own), faces, simplified.error, missed)
+    return ReplacedObject(number, name, octree, len(faces), count, simplified.error, missed)
+
+
+@dataclass(frozen=True)
+class Replacing:
+    """The scene as modelled, and with simplified meshes, and the options of the maps."""
+
+    source: Scene
+    shown: Scene
+    options: ApoOptions
+
+    def normal_map(self, number: int) -> NormalMap:
+        """The normal map of a replaced object; raises as `normal_map`."""
+        faces = np.flatnonzero(self.shown.triangle_object == number)
+        used, corners = np.unique(self.shown.triangles[faces], return_inverse=True)
+        mesh = smooth(self.shown.points[used], corners.reshape(-1, 3).astype(np.int32))
+        modelled = np.flatnonzero(self.source.triangle_object == number)
+        return normal_map(mesh, *mesh_of(self.source, modelled), self.options)
+
+
+def object_maps(shown: Scene, objects: NDArray[np.int32], maps: list[NormalMap]) -> ObjectMaps:
+    """The places of ``objects``, ascending, in their maps."""
+    faces = [np.flatnonzero(shown.triangle_object == number) for number in objects.tolist()]
+    order = np.argsort(np.concatenate(faces), kind="stable")
+    return ObjectMaps(
+        objects,
+        np.array([len(relief.texels) for relief in maps], np.int32),
+        np.concatenate([relief.uv for relief in maps])[order],
+        np.concatenate([relief.frame for relief in maps])[order],
+    )

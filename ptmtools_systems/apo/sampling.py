@@ -71,16 +71,16 @@ def spread(corner: Floats, spacing: float) -> Points:
     """Points on (m, 3, 3) triangles, about ``spacing`` apart; at least one on each."""
     count = len(corner)
     first = longest_first(corner)
-    each = np.arange(count)
-    begin, end = (corner[each, (first + k) % 3] for k in range(2))
+    number = np.arange(count)
+    begin, end = (corner[number, (first + k) % 3] for k in range(2))
     longest = np.linalg.norm(end - begin, axis=1)
     height = np.divide(2 * areas(corner), longest, out=np.zeros(count), where=longest > 0)
     rows = np.maximum(np.rint(height / spacing), 1).astype(np.int64)
-    row_triangle, row = _counted(rows)
+    row_triangle, row = _enumerate_items(rows)
     up = (row + 0.5) / rows[row_triangle]
     width = longest[row_triangle] * (1 - up)
     columns = np.maximum(np.rint(width / spacing), 1).astype(np.int64)
-    point_row, column = _counted(columns)
+    point_row, column = _enumerate_items(columns)
     along = (column + 0.5) / columns[point_row]
     triangle, up = row_triangle[point_row], up[point_row]
     turned = np.stack([(1 - up) * (1 - along), (1 - up) * along, up], axis=1)
@@ -89,14 +89,14 @@ def spread(corner: Floats, spacing: float) -> Points:
     return Points(triangle, np.take_along_axis(turned, place, axis=1))
 
 
-def _counted(counts: Ints) -> tuple[Ints, Ints]:
+def _enumerate_items(counts: Ints) -> tuple[Ints, Ints]:
     """For each of ``counts`` items: (n,) its owner, and its number among the owner's."""
     owner = np.repeat(np.arange(len(counts)), counts)
     begin = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - begin[owner]
 
 
-def at(values: Floats, points: Points) -> Floats:
+def interpolate(values: Floats, points: Points) -> Floats:
     """(n, k) interpolation of (m, 3, k) values of corners at points."""
     result: Floats = np.einsum("ij,ijk->ik", points.weight, values[points.triangle])
     return result
@@ -127,14 +127,14 @@ class Paint:
         result: Floats = np.einsum("ij,ijk->ik", weight, self.corner[triangle] / 255.0)
         image = self.image[triangle]
         for number in np.unique(image[image >= 0]).tolist():
-            here = np.flatnonzero(image == number)
-            triangle_, texels = triangle[here], self.images[number]
-            uv = np.einsum("ij,ijk->ik", weight[here], self.uv[triangle_].astype(np.float64))
+            rows = np.flatnonzero(image == number)
+            triangle_, texels = triangle[rows], self.images[number]
+            uv = np.einsum("ij,ijk->ik", weight[rows], self.uv[triangle_].astype(np.float64))
             kept = np.where(self.clamped[triangle_], np.clip(uv, 0, 1), uv - np.floor(uv))
             height, width = texels.shape[:2]
             column = np.minimum((kept[:, 0] * width).astype(np.int64), width - 1)
             row = np.minimum(((1 - kept[:, 1]) * height).astype(np.int64), height - 1)
-            result[here] *= texels[row, column] / 255.0
+            result[rows] *= texels[row, column] / 255.0
         return result
 
 
@@ -244,18 +244,18 @@ def _cast(source: Source, origin: Floats, along: Floats, normal: Floats, limit: 
     for _ in range(LAYERS + 1):
         rays = along[waiting].astype(np.float32)
         begin = (origin[waiting] + gone[waiting, None] * along[waiting]).astype(np.float32)
-        left = np.maximum(limit[waiting] - gone[waiting], 0).astype(np.float32)
-        hits = source.tree.run(begin, rays, dists=left, output=True)
+        reach = np.maximum(limit[waiting] - gone[waiting], 0).astype(np.float32)
+        hits = source.tree.run(begin, rays, dists=reach, output=True)
         hit = hits["primID"].astype(np.int64)
         met = hit >= 0
-        far = gone[waiting] + hits["tfar"]
+        travelled = gone[waiting] + hits["tfar"]
         same = met & _same_way(source.facing[hit], normal[waiting])
         taken = waiting[same]
         u, v = hits["u"][same], hits["v"][same]
-        triangle[taken], distance[taken] = hit[same], np.abs(far[same])
+        triangle[taken], distance[taken] = hit[same], np.abs(travelled[same])
         weight[taken] = np.stack([1 - u - v, u, v], axis=1)
-        on = met & ~same & (far < limit[waiting])
-        gone[waiting[on]] = far[on] + STEP
+        on = met & ~same & (travelled < limit[waiting])
+        gone[waiting[on]] = travelled[on] + STEP
         waiting = waiting[on]
         if not len(waiting):
             break

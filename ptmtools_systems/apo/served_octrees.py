@@ -6,49 +6,26 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.arrays import Bools, Floats, areas
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.output.names import HINTS
 from ptmtools.output.served import BUILD, Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.records import Sight, Triangles
 from ptmtools_systems.apo.declarations import OCTREES
-from ptmtools_systems.apo.files import inflated
+from ptmtools_systems.apo.files import inflate_texels
+from ptmtools_systems.apo.model import Octrees
 
 #: Number of points of each object at which the levels of its octree are compared, and the seed of
 #: their places.
 _POINTS, _SEED = 4096, 1
 #: Brightness of the lit surface in the comparison, 0 to 255.
 _BRIGHT = 255 * 0.7
-
-
-class Octrees(NamedTuple):
-    """Concatenated octree textures.
-
-    Attributes
-    ----------
-    texel: (N, 4) uint8. begin: (O + 1,) first texel of each octree.
-    levels: (O,) number of levels.
-    low, side: (O, 3), (O,) lower corner and side of the cubes, metres.
-    of: (m,) int32 octree of each triangle of the surfaces, -1 for none.
-    """
-
-    texel: NDArray[np.uint8]
-    begin: Ints
-    levels: Ints
-    low: Floats
-    side: Floats
-    of: NDArray[np.int32]
-
-    @property
-    def number(self) -> int:
-        """Number of octrees."""
-        return len(self.levels)
 
 
 def read_octrees(served: Served) -> Octrees:
@@ -100,7 +77,7 @@ def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
     if not problem:
         data = served.read(row["file"])
         try:
-            return inflated(data, start, row)
+            return inflate_texels(data, start, row)
         except (InputError, zlib.error) as fault:
             problem = getattr(fault, "message", str(fault))
     raise DatabaseError("PTM-D006", problem, file=file, remedy=BUILD)

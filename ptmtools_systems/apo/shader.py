@@ -18,7 +18,7 @@ from ptmtools.arrays import Floats
 from ptmtools.coverage.backends.opengl import create_context
 from ptmtools_systems.apo.model import Octree
 from ptmtools_systems.apo.traversal import WIDTH, rows_of
-from ptmtools_systems.apo.view import AMBIENT, FILL, KEY, STONE, Frame, Look, View
+from ptmtools_systems.apo.view import AMBIENT, FILL, KEY, STONE, Look, OctreePicture, OctreeView
 
 #: Least farthest depth, for a view without points; nearest depth, as a share of the farthest.
 TINY, NEAR = 2.0**-100, 2.0**-14
@@ -127,7 +127,9 @@ void main() {{
 )
 
 
-def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -> Frame:
+def draw(
+    octree: Octree, corners: Floats, normal: Floats, view: OctreeView, look: Look
+) -> OctreePicture:
     """The picture of (T, 3, 3) corners in the cube, with their own normals (T, 3, 3), which are
     displayed without levels. ``view`` is in the cube, too.
 
@@ -136,7 +138,7 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
     context, size, colors = create_context(), (view.width, view.height), octree.colors
     try:
         program = context.program(vertex_shader=MESH, fragment_shader=SHADE)
-        data = np.concatenate([corners, own], axis=2).astype(np.float32)
+        data = np.concatenate([corners, normal], axis=2).astype(np.float32)
         buffer = context.buffer(data.tobytes())
         drawing = context.vertex_array(program, [(buffer, "3f 3f", "corner", "own")])
         shown = context.texture(size, 4, dtype="f1")
@@ -149,11 +151,11 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
         target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         address.write(np.full(size, -2, np.int32).tobytes())
         layers = [octree.texels] if colors is None else [octree.texels, colors]
-        textures = [uploaded(context, texels) for texels in layers]
+        textures = [upload_texels(context, texels) for texels in layers]
         for unit, texture in enumerate(textures):
             texture.use(unit)
         depths: Floats = (corners.reshape(-1, 3) - view.eye) @ view.axes[2]
-        far = 2 * float(np.abs(depths).max(initial=TINY))
+        farthest = 2 * float(np.abs(depths).max(initial=TINY))
         key, fill = look.lights(view)
         values = {
             "octree": 0,
@@ -162,8 +164,8 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
             "eye": tuple(view.eye.tolist()),
             "view": tuple(view.axes.T.reshape(-1).tolist()),
             "half_": view.half,
-            "near": far * NEAR,
-            "far": far,
+            "near": farthest * NEAR,
+            "far": farthest,
             "colors": len(textures) - 1,
             "colored": colors is not None,
             "only_normals": look.what == "normals",
@@ -181,12 +183,12 @@ def draw(octree: Octree, corners: Floats, own: Floats, view: View, look: Look) -
         where = np.frombuffer(place.read(), dtype=np.float32).reshape(*shape, 4).astype(np.float64)
         picture = np.where((at == -2)[..., None], look.background, color[..., :3]).astype(np.uint8)
         name = str(context.info["GL_RENDERER"])
-        return Frame(picture, at, where[..., :3], where[..., 3].astype(np.int64), name)
+        return OctreePicture(picture, at, where[..., :3], where[..., 3].astype(np.int64), name)
     finally:
         context.release()
 
 
-def uploaded(context: Any, texels: NDArray[np.uint8]) -> Any:
+def upload_texels(context: Any, texels: NDArray[np.uint8]) -> Any:
     """The texture of (n, 4) texels, looked up without filtering."""
     rows = rows_of(texels)
     texture = context.texture(rows.shape[1::-1], 4, rows.tobytes(), dtype="u1")

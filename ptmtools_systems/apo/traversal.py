@@ -54,7 +54,7 @@ def look_up(
         depth = np.minimum(depth, stop)
     at, deep = np.empty(len(q), dtype=np.int64), np.empty(len(q), dtype=np.int64)
     _walk(np.ascontiguousarray(octree.texels), inside, depth, at, deep)
-    return Nodes(at, deep, unpacked(octree.texels[at]))
+    return Nodes(at, deep, unpack_normals(octree.texels[at]))
 
 
 def stop_depth(step: Floats) -> Ints:
@@ -74,7 +74,7 @@ def rows_of(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return out.reshape(height, WIDTH, 4)
 
 
-def unpacked(texels: NDArray[np.uint8]) -> Floats:
+def unpack_normals(texels: NDArray[np.uint8]) -> Floats:
     """(n, 3) unit normals of (n, 4) texels."""
     vector = texels[:, :3] / 127.5 - 1.0
     return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))

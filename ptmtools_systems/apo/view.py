@@ -18,7 +18,7 @@ _STRAIGHT = 2.0**-40
 
 
 @dataclass(frozen=True)
-class View:
+class OctreeView:
     """A pinhole camera with Y up.
 
     Attributes
@@ -70,7 +70,7 @@ def view_of(
     width: int,
     height: int,
     field_of_view: float = FIELD_OF_VIEW,
-) -> View:
+) -> OctreeView:
     """A view of the middle of (P, 3) points.
 
     ``azimuth`` 0 looks from +Z, 90 from +X; ``elevation`` 90 from above, degrees. ``distance`` from
@@ -87,7 +87,9 @@ def view_of(
         angle = np.arctan(np.tan(np.radians(field_of_view) / 2) * min(1.0, width / height))
         distance = float(0.5 / np.sin(angle))
     middle = (low + high) / 2
-    return View(middle + distance * diameter * towards_eye, middle, width, height, field_of_view)
+    return OctreeView(
+        middle + distance * diameter * towards_eye, middle, width, height, field_of_view
+    )
 
 
 #: Shares of white light: ambient, from the upper left, and from the lower right, which shows relief
@@ -121,13 +123,13 @@ class Look:
         """(3,) colour of empty pixels; no unit normal is stored as black."""
         return np.array([0, 0, 0] if self.what == "normals" else [58, 62, 70], dtype=np.uint8)
 
-    def lights(self, view: View) -> tuple[Floats, Floats]:
+    def lights(self, view: OctreeView) -> tuple[Floats, Floats]:
         """Unit vectors towards both lights, which move with the camera."""
         axes = view.axes * [[1], [1], [-1]]
         key, fill = (np.array(light) @ axes for light in (_KEY, _FILL))
         return key / np.linalg.norm(key), fill / np.linalg.norm(fill)
 
-    def shown(self, normals: Floats, colors: NDArray[np.uint8] | None, view: View) -> Floats:
+    def shade(self, normals: Floats, colors: NDArray[np.uint8] | None, view: OctreeView) -> Floats:
         """(n, 3) shares of full light, from unit normals and the (n, 4) colours below them."""
         if self.what == "normals":
             return normals / 2 + 0.5
@@ -138,7 +140,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Frame:
+class OctreePicture:
     """A picture with data of its pixels.
 
     Attributes

@@ -23,7 +23,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Material, Scene
 from ptmtools.scene.options import IngestOptions
-from ptmtools_systems.campus.making import Work, make_object
+from ptmtools_systems.campus.making import ObjectSource, make_object
 from ptmtools_systems.campus.model import (
     ALPHA,
     FORM,
@@ -35,8 +35,7 @@ from ptmtools_systems.campus.model import (
 )
 from ptmtools_systems.campus.objects import notes_on, parts_of
 from ptmtools_systems.campus.options import CampusOptions
-from ptmtools_systems.campus.places import read_places
-from ptmtools_systems.campus.records import files_of, read_records
+from ptmtools_systems.campus.records import files_of, read_places, read_records
 from ptmtools_systems.campus.second_set import model_light, model_masks
 from ptmtools_systems.campus.textures import BaseImage, Mask, texture_files
 
@@ -115,7 +114,7 @@ def make_campus(
         pages, more = read_records(records, [(name, part.label) for name, part in tasks])
         places, strange = read_places(records, [(name, part.label) for name, part in tasks])
         rows, notes = files_of(pages), [*notes, *more, *strange]
-    work = Work(
+    work = ObjectSource(
         scene.points,
         scene.triangles,
         scene.uv,
@@ -139,19 +138,19 @@ def make_campus(
         end("textures")
         objects: list[CampusObject] = []
         covered = computed = 0
-        for done, each in enumerate(executor.each(make_object, work, tasks)):
+        for done, made in enumerate(executor.each(make_object, work, tasks)):
             progress(done, len(tasks), "objects")
-            for file, data in each.meshes:
+            for file, data in made.meshes:
                 put(file, data)
-            for record, data in each.lightmaps:
+            for record, data in made.lightmaps:
                 put(record.file, data)
                 textures.append(record)
-            row, page = rows.get(each.record.name, (None, b""))
+            row, page = rows.get(made.record.name, (None, b""))
             if row is not None:
                 put(row.file, page)
-            objects.append(replace(each.record, record=row, **places.get(each.record.name, {})))
-            notes += each.notes
-            covered, computed = covered + each.covered, computed + each.computed
+            objects.append(replace(made.record, record=row, **places.get(made.record.name, {})))
+            notes += made.notes
+            covered, computed = covered + made.covered, computed + made.computed
         progress(len(tasks), len(tasks), "objects")
         end("objects")
         campus = Campus(
@@ -181,7 +180,7 @@ def _bases(
     """The textures, one for each distinct image and mask; and the index of each material's."""
     index_of: dict[tuple[int, str], int] = {}
     bases: list[BaseImage] = []
-    of: dict[int, int] = {}
+    base_of: dict[int, int] = {}
     for number, material in enumerate(scene.materials):
         if material.image < 0:
             continue
@@ -192,11 +191,11 @@ def _bases(
             index_of[key] = len(bases)
             name = names.take(Path(image.name).stem, "texture")
             bases.append(BaseImage(name, image, alpha=False, mask=mask))
-        of[number] = index_of[key]
+        base_of[number] = index_of[key]
         if _cut_out(scene, material):
             known = bases[index_of[key]]
             bases[index_of[key]] = BaseImage(known.base, known.image, True, known.mask)
-    return bases, of
+    return bases, base_of
 
 
 def _cut_out(scene: Scene, material: Material) -> bool:
@@ -211,15 +210,15 @@ def _digest(mask: Mask) -> str:
 
 
 def _materials(
-    scene: Scene, of: Mapping[int, int], bases: list[BaseImage]
+    scene: Scene, base_of: Mapping[int, int], bases: list[BaseImage]
 ) -> tuple[tuple[CampusMaterial, ...], NDArray[np.int32]]:
     """The materials of a campus, one for each material of the scene and the sides that show it; and
     (T,) the material of each face."""
     key = 2 * scene.triangle_material.astype(np.int64) + scene.two_sided
     used, place = np.unique(key, return_inverse=True)
     materials = []
-    for number, both in (divmod(one, 2) for one in used.tolist()):
-        base = bases[of[number]] if number in of else None
+    for number, both in (divmod(code, 2) for code in used.tolist()):
+        base = bases[base_of[number]] if number in base_of else None
         given = scene.materials[number]
         channels = () if base is None else base.channels
         if base is not None and not _cut_out(scene, given):

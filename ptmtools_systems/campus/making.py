@@ -30,7 +30,7 @@ from ptmtools_systems.campus.model import (
     MeshFile,
     mesh_file,
 )
-from ptmtools_systems.campus.objects import Part
+from ptmtools_systems.campus.objects import ObjectPart
 from ptmtools_systems.campus.options import CampusOptions
 from ptmtools_systems.campus.second_set import ModelLight
 from ptmtools_systems.campus.textures import Written, light_files
@@ -61,7 +61,7 @@ _BENEATH = 2.0
 
 
 @dataclass(frozen=True)
-class Work:
+class ObjectSource:
     """Data shared by all objects.
 
     Attributes
@@ -97,7 +97,7 @@ class ObjectMade:
     computed: int = 0
 
 
-def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
+def make_object(work: ObjectSource, task: tuple[str, ObjectPart]) -> ObjectMade:
     """An object by its name in files.
 
     Raises what `unwrap` raises.
@@ -145,8 +145,8 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         color = None if colors is None else to_linear(colors / 255)
         if lit and not fine:
             look = _look(work, faces, finest, level, side)
-            held = vertex_light(look, points, normals(points))[..., None]
-            color = held * (np.ones(3) if color is None else color)
+            light = vertex_light(look, points, normals(points))[..., None]
+            color = light * (np.ones(3) if color is None else color)
         corners = Corners(points, material, uv, atlas.uv if lit and fine else None, color)
         data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)
         files.append((file, data))
@@ -174,7 +174,7 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
 
 
 def _look(
-    work: Work, faces: Ints, finest: Floats, level: Simplified, side: Floats
+    work: ObjectSource, faces: Ints, finest: Floats, level: Simplified, side: Floats
 ) -> RayLight | PaintedLight:
     """The light on the faces of a level; ``finest``: (T, 3, 3) those of the finest one, ``side``:
     (T,) their lit sides."""
@@ -191,7 +191,7 @@ def _look(
     )
 
 
-def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
+def _light_source(work: ObjectSource, faces: Ints) -> tuple[int, int]:
     """The size of the lightmap's source: the largest image, or one ray a texel."""
     if work.painted is None:
         return LIGHT_SIZES[-1], LIGHT_SIZES[-1]

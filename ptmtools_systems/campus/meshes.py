@@ -63,13 +63,13 @@ def mesh_bytes(mesh: Corners, materials: tuple[CampusMaterial, ...]) -> bytes:
         material = materials[index]
         data: dict[str, NDArray[Any]] = {"POSITION": mesh.point[faces].astype("<f4")}
         if material.base is not None:
-            data["TEXCOORD_0"] = _flipped(mesh.uv[faces])
+            data["TEXCOORD_0"] = _flip_v(mesh.uv[faces])
         if mesh.light is not None:
-            data["TEXCOORD_1"] = _flipped(mesh.light[faces])
+            data["TEXCOORD_1"] = _flip_v(mesh.light[faces])
         if mesh.color is not None:
-            held = np.full((len(faces), 3, 4), 65535, "<u2")
-            held[..., :3] = np.rint(65535 * np.clip(mesh.color[faces], 0, 1))
-            data["COLOR_0"] = held
+            texels = np.full((len(faces), 3, 4), 65535, "<u2")
+            texels[..., :3] = np.rint(65535 * np.clip(mesh.color[faces], 0, 1))
+            data["COLOR_0"] = texels
         rows = [part.reshape(3 * len(faces), -1).view(np.uint8) for part in data.values()]
         first, triangle = _vertices(np.concatenate(rows, axis=1))
         vertices = {name: part.reshape(-1, part.shape[-1])[first] for name, part in data.items()}
@@ -121,13 +121,13 @@ def read_mesh(data: bytes) -> tuple[Primitive, ...]:
     try:
         view_bytes(document, binary)
         wanted = document["meshes"][0]["primitives"]
-        held = len(binary)
+        unread = len(binary)
         parts = []
         for primitive in wanted:
             parts.append(_read(document, binary, primitive))
             # Each has arrays of its own, so all together are no larger than the bytes.
-            held -= parts[-1].point.size * 4
-            if held < 0:
+            unread -= parts[-1].point.size * 4
+            if unread < 0:
                 raise ValueError("primitives that share their arrays")
     except (LookupError, TypeError, AttributeError) as fault:
         raise ValueError(f"not as a mesh of a campus is ({fault})") from None
@@ -141,10 +141,10 @@ def view_bytes(document: Any, binary: bytes) -> int:
 
     Raises ValueError if its views exceed its bytes, LookupError or TypeError for invalid glTF.
     """
-    held = sum(natural(view["byteLength"]) for view in document["bufferViews"])
-    if held > len(binary):
-        raise ValueError(f"views of {held} bytes in {len(binary)}")
-    return held
+    total = sum(natural(view["byteLength"]) for view in document["bufferViews"])
+    if total > len(binary):
+        raise ValueError(f"views of {total} bytes in {len(binary)}")
+    return total
 
 
 def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primitive:
@@ -182,7 +182,7 @@ def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primiti
     )
 
 
-def _flipped(uv: Floats) -> Singles:
+def _flip_v(uv: Floats) -> Singles:
     """Coordinates with the origin at the upper left."""
     return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1).astype("<f4")
 

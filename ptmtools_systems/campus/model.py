@@ -182,7 +182,7 @@ class Campus:
     def presets(self) -> tuple[Preset, ...]:
         """The cost of all of the campus in each quality: every mesh, textures of the least size and
         of the preset's, and its lightmaps."""
-        meshes = sum(mesh.bytes for each in self.objects for mesh in each.meshes)
+        meshes = sum(mesh.bytes for item in self.objects for mesh in item.meshes)
         parts = []
         for quality in PRESETS:
             total = meshes + self._bytes(quality.light, (LIGHT,))
@@ -198,10 +198,10 @@ class Campus:
     def files(self) -> dict[str, tuple[int, int]]:
         """Bytes and CRC-32 of every file but the index, by name."""
         result = {t.file: (t.bytes, t.crc32) for t in self.textures}
-        for each in self.objects:
-            result |= {mesh.file: (mesh.bytes, mesh.crc32) for mesh in each.meshes}
-            if each.record is not None:
-                result[each.record.file] = each.record.bytes, each.record.crc32
+        for item in self.objects:
+            result |= {mesh.file: (mesh.bytes, mesh.crc32) for mesh in item.meshes}
+            if item.record is not None:
+                result[item.record.file] = item.record.bytes, item.record.crc32
         return result
 
     def to_document(self) -> dict[str, Any]:
@@ -216,7 +216,7 @@ class Campus:
             "lightmaps": self.lightmaps,
             "start": self.start,
             "presets": [vars(preset) for preset in self.presets],
-            "objects": [_object_document(each) for each in self.objects],
+            "objects": [_object_document(item) for item in self.objects],
             "materials": [_material_document(material) for material in self.materials],
             "textures": [vars(texture) for texture in self.textures],
         }
@@ -239,14 +239,14 @@ class Campus:
         )
 
 
-def _object_document(each: CampusObject) -> dict[str, Any]:
+def _object_document(item: CampusObject) -> dict[str, Any]:
     result = {
-        **vars(each),
-        "viewpoint": dict(zip(("position", "direction"), each.viewpoint, strict=True)),
-        "meshes": [vars(mesh) for mesh in each.meshes],
+        **vars(item),
+        "viewpoint": dict(zip(("position", "direction"), item.viewpoint, strict=True)),
+        "meshes": [vars(mesh) for mesh in item.meshes],
     }
-    if each.record is not None:
-        result["record"] = vars(each.record)
+    if item.record is not None:
+        result["record"] = vars(item.record)
     absent = [name for name in ("record", "icon", "rank") if result[name] is None]
     return {name: value for name, value in result.items() if name not in absent}
 
@@ -351,5 +351,5 @@ def distances(eye: Floats, boxes: Floats, barycentres: Floats) -> Floats:
     # parallel to them.
     room = np.where(way > 0, high - barycentres, low - barycentres)
     share = np.divide(room, way, out=np.full(way.shape, np.inf), where=way != 0)
-    left = np.clip(share, 0.0, 1.0).min(axis=-1)
-    return np.asarray((1.0 - left) * np.linalg.norm(way, axis=-1))
+    share_to_box = np.clip(share, 0.0, 1.0).min(axis=-1)
+    return np.asarray((1.0 - share_to_box) * np.linalg.norm(way, axis=-1))

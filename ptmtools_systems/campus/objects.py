@@ -25,7 +25,7 @@ MOST_FACES = 0.8
 
 
 @dataclass(frozen=True)
-class Part:
+class ObjectPart:
     """An object of the campus.
 
     Attributes
@@ -40,7 +40,7 @@ class Part:
     triangles: Ints
 
 
-def parts_of(scene: Scene, small: float) -> tuple[Part, ...]:
+def parts_of(scene: Scene, small: float) -> tuple[ObjectPart, ...]:
     """The objects of a scene, in the order of the model; ``small`` as in `CampusOptions`.
 
     Raises LimitError: PTM-L400 there are more than `MAX_OBJECTS`.
@@ -69,11 +69,11 @@ def parts_of(scene: Scene, small: float) -> tuple[Part, ...]:
     parts = []
     for triangles, these in zip(np.split(order, np.cumsum(sizes)[:-1]), named, strict=True):
         names = tuple(scene.objects[i] for i in these.tolist())
-        parts.append(Part(_label(names), names, triangles))
+        parts.append(ObjectPart(_label(names), names, triangles))
     return tuple(parts)
 
 
-def notes_on(parts: Sequence[Part]) -> tuple[str, ...]:
+def notes_on(parts: Sequence[ObjectPart]) -> tuple[str, ...]:
     """Notes on the division into objects."""
     joined = [part for part in parts if len(part.parts) > 1]
     notes = []
@@ -93,11 +93,11 @@ def notes_on(parts: Sequence[Part]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _boxes(corners: Floats, of: np.ndarray, count: int) -> Floats:
-    """(count, 6) bounding boxes of objects; ``of``: (T,) the object of each of (T, 3, 3) faces."""
+def _boxes(corners: Floats, owner: np.ndarray, count: int) -> Floats:
+    """(count, 6) bounding boxes of objects; ``owner``: (T,) the object of each face."""
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, of, corners.min(axis=1))
-    np.maximum.at(high, of, corners.max(axis=1))
+    np.minimum.at(low, owner, corners.min(axis=1))
+    np.maximum.at(high, owner, corners.max(axis=1))
     return np.concatenate([low, high], axis=1)
 
 

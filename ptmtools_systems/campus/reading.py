@@ -54,9 +54,9 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
         campus = Campus.from_document(schemas.read(data, schemas.CAMPUS))
     except schemas.ShapeError as fault:
         raise wrong(fault.place or None, fault.message) from None
-    for place, each in enumerate(campus.objects):
-        if len(each.meshes) != campus.lods:
-            message = f"has {len(each.meshes)} items, not {campus.lods}"
+    for place, item in enumerate(campus.objects):
+        if len(item.meshes) != campus.lods:
+            message = f"has {len(item.meshes)} items, not {campus.lods}"
             raise wrong(f"objects[{place}].meshes", message)
     return campus
 
@@ -68,7 +68,7 @@ _WORDS = {"d": "diffuse", "a": "alpha", "m": "mask", "l": "lightmap"}
 
 
 @dataclass(frozen=True)
-class Kind:
+class TextureStatistics:
     """Textures of one side and channel: how many, their bytes, those of files that are larger than
     their source, and the paper's average, KB."""
 
@@ -85,7 +85,7 @@ class Kind:
         return self.bytes / self.files / 1024
 
 
-def kinds(campus: Campus) -> list[Kind]:
+def kinds(campus: Campus) -> list[TextureStatistics]:
     """The textures of a campus, by channel and size."""
     result = []
     for channel, sizes, paper in (
@@ -97,7 +97,9 @@ def kinds(campus: Campus) -> list[Kind]:
             if these:
                 total = sum(t.bytes for t in these)
                 enlarged = sum(t.bytes for t in these if side > max(t.source))
-                result.append(Kind(channel, side, len(these), total, enlarged, paper[side]))
+                result.append(
+                    TextureStatistics(channel, side, len(these), total, enlarged, paper[side])
+                )
     return result
 
 

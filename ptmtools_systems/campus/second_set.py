@@ -146,9 +146,9 @@ def _second_masks(read: SecondReading, scene: Scene) -> _Candidates:
         texture = source.materials[index].texture
         if texture is None or scene.materials[number].image < 0:
             continue
-        own = material == index
+        faces_of = material == index
         mirrored = "mirror" in (texture.wrap_s, texture.wrap_t)
-        if mirrored or not np.array_equal(source.uv[faces][own], scene.uv[own]):
+        if mirrored or not np.array_equal(source.uv[faces][faces_of], scene.uv[faces_of]):
             yield number, "", "other texture coordinates"
         else:
             yield number, "", Mask(texture.read, texture.label, band=1, inverted=True)
@@ -157,8 +157,8 @@ def _second_masks(read: SecondReading, scene: Scene) -> _Candidates:
 def _named_masks(model: Path, scene: Scene, options: IngestOptions) -> _Candidates:
     """The masks that the scene's own reader names."""
     folder = ModelFolder(model.absolute().parent, options.allow_outside)
-    for number, (own, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
-        if own.image < 0 or shine is None:
+    for number, (material, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
+        if material.image < 0 or shine is None:
             continue
         file = None if shine.fault else folder.find(shine.file, shine.base)
         if file is None:

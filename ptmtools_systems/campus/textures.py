@@ -65,30 +65,30 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
 
     Raises as decoding.
     """
-    most, quality = limits
+    limit, quality = limits
     result: list[Written] = []
 
     def put(size: int, channel: str, image: Image.Image, source: tuple[int, int]) -> None:
-        result.append(_written(base.base, size, channel, jpeg(image, quality), source))
+        result.append(_texture_file(base.base, size, channel, jpeg(image, quality), source))
 
     if base.image is not None:
-        image = _decoded(base.image.load(), most, base.image.name)
+        image = _decode_image(base.image.load(), limit, base.image.name)
         alpha = None
         if base.alpha:
             alpha = image.getchannel("A") if "A" in image.getbands() else _white(image)
         colors = image.convert("RGB")
         for size in SIZES:
             if alpha is None:
-                put(size, DIFFUSE, squared(colors, size), image.size)
+                put(size, DIFFUSE, square_image(colors, size), image.size)
             else:
-                put(size, DIFFUSE, weighted(colors, alpha, size), image.size)
-                put(size, ALPHA, squared(alpha, size), image.size)
+                put(size, DIFFUSE, weight_colors(colors, alpha, size), image.size)
+                put(size, ALPHA, square_image(alpha, size), image.size)
     if base.mask is not None:
-        image, band = _decoded(base.mask.load(), most, base.mask.label), base.mask.band
-        held = np.asarray(image.convert("L") if band < 0 else image.convert("RGB").getchannel(band))
-        shine = _grey(255 - held if base.mask.inverted else held)
+        image, band = _decode_image(base.mask.load(), limit, base.mask.label), base.mask.band
+        grey = np.asarray(image.convert("L") if band < 0 else image.convert("RGB").getchannel(band))
+        shine = _grey(255 - grey if base.mask.inverted else grey)
         for size in SIZES:
-            put(size, MASK, squared(shine, size), shine.size)
+            put(size, MASK, square_image(shine, size), shine.size)
     return result
 
 
@@ -97,19 +97,19 @@ def light_files(
 ) -> list[Written]:
     """The files of a lightmap, given as side, (side, side) or (side, side, 3) texels, source."""
     return [
-        _written(base, size, "l", jpeg(_grey(texels), quality), source)
+        _texture_file(base, size, "l", jpeg(_grey(texels), quality), source)
         for size, texels, source in maps
     ]
 
 
 def jpeg(image: Image.Image, quality: int) -> bytes:
     """The bytes of a JPEG file, the same for the same texels."""
-    held = io.BytesIO()
-    image.save(held, "JPEG", quality=quality, optimize=True)
-    return held.getvalue()
+    buffer = io.BytesIO()
+    image.save(buffer, "JPEG", quality=quality, optimize=True)
+    return buffer.getvalue()
 
 
-def squared(image: Image.Image, size: int) -> Image.Image:
+def square_image(image: Image.Image, size: int) -> Image.Image:
     """An image as a square: averaged along an axis that shrinks, interpolated along one that
     grows."""
     from PIL.Image import Resampling
@@ -122,40 +122,42 @@ def squared(image: Image.Image, size: int) -> Image.Image:
     return image
 
 
-def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
+def weight_colors(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
     """The colours of an image as a square, each with the weight of its ``alpha``; unweighted where
     that is 0."""
     from PIL import Image
 
     share = np.asarray(alpha, np.float32)
-    total = _resized(share, size)
-    plain = squared(colors, size)
-    held = np.asarray(plain, np.float32).copy()
+    total = _resize(share, size)
+    plain = square_image(colors, size)
+    result = np.asarray(plain, np.float32).copy()
     # Interpolation overshoots beside transparent texels.
     covered = total >= 1
     for band in range(3):
-        of = _resized(np.asarray(colors.getchannel(band), np.float32) * share, size)
-        held[covered, band] = of[covered] / total[covered]
-    return Image.fromarray(np.rint(np.clip(held, 0, 255)).astype(np.uint8))
+        band_sum = _resize(np.asarray(colors.getchannel(band), np.float32) * share, size)
+        result[covered, band] = band_sum[covered] / total[covered]
+    return Image.fromarray(np.rint(np.clip(result, 0, 255)).astype(np.uint8))
 
 
-def _resized(texels: Singles, size: int) -> Singles:
+def _resize(texels: Singles, size: int) -> Singles:
     from PIL import Image
 
-    return np.asarray(squared(Image.fromarray(texels), size), np.float32)
+    return np.asarray(square_image(Image.fromarray(texels), size), np.float32)
 
 
-def _written(base: str, size: int, channel: str, data: bytes, source: tuple[int, int]) -> Written:
+def _texture_file(
+    base: str, size: int, channel: str, data: bytes, source: tuple[int, int]
+) -> Written:
     name, crc = texture_file(base, size, channel), zlib.crc32(data)
     return TextureFile(name, base, size, channel, len(data), crc, source), data
 
 
-def _decoded(data: bytes, most: int, label: str) -> Image.Image:
+def _decode_image(data: bytes, limit: int, label: str) -> Image.Image:
     """An image of 8 bits: L, RGB or RGBA. Its orientation is ignored, as for all textures."""
     from PIL import Image
 
     with naming(label):
-        texels = in_eight_bits(load_image(data, Limits(most)).array())
+        texels = in_eight_bits(load_image(data, Limits(limit)).array())
     kinds = {1: "L", 2: "LA", 3: "RGB", 4: "RGBA"}
     shown = texels[:, :, 0] if texels.shape[2] == 1 else texels
     image = Image.fromarray(np.ascontiguousarray(shown), kinds[texels.shape[2]])

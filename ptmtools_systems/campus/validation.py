@@ -45,11 +45,11 @@ class _Check:
         self.findings = Findings(FOLDER_CODES)
         self.files = self.bytes = 0
 
-    def bytes_of(self, name: str, code: str, most: int) -> bytes | None:
-        """The bytes of a file, at most ``most`` + 1 of them."""
+    def bytes_of(self, name: str, code: str, limit: int) -> bytes | None:
+        """The bytes of a file, at most ``limit`` + 1 of them."""
         try:
             with open_below(self._folder, name) as stream:
-                data = stream.read(most + 1)
+                data = stream.read(limit + 1)
         except (OSError, ValueError) as fault:
             reason = getattr(fault, "strerror", None) or str(fault)
             self.findings.add(code, name, "", f"cannot be read ({reason})")
@@ -66,11 +66,11 @@ class _Check:
             self.findings.add("PTM-D800", INDEX, fault.place or "", fault.message)
             return
         self._references(campus)
-        for each in campus.objects:
-            for lod, mesh in enumerate(each.meshes):
-                self._mesh(campus, each, mesh, finest=lod == len(each.meshes) - 1)
-            if each.record is not None:
-                self._record(each.record)
+        for item in campus.objects:
+            for lod, mesh in enumerate(item.meshes):
+                self._mesh(campus, item, mesh, finest=lod == len(item.meshes) - 1)
+            if item.record is not None:
+                self._record(item.record)
         for texture in campus.textures:
             self._image(texture)
         known = {INDEX, *campus.files()}
@@ -84,8 +84,8 @@ class _Check:
         """The materials that objects name, and the textures of materials and lightmaps, exist; no
         two files have one name."""
         at = self.findings.place(INDEX)
-        files = [file.file for each in campus.objects for file in each.meshes]
-        files += [each.record.file for each in campus.objects if each.record is not None]
+        files = [file.file for item in campus.objects for file in item.meshes]
+        files += [item.record.file for item in campus.objects if item.record is not None]
         seen: set[str] = set()
         for name in (*files, *(texture.file for texture in campus.textures)):
             if name.lower() in seen:
@@ -98,14 +98,14 @@ class _Check:
             for channel in material.channels
             for side in SIZES
         }
-        for i, each in enumerate(campus.objects):
-            for number in each.materials:
+        for i, item in enumerate(campus.objects):
+            for number in item.materials:
                 if number >= len(campus.materials):
                     message = f"material {number} does not exist"
                     at.add("PTM-D800", message, f"objects[{i}].materials")
-            if each.lightmap is not None:
+            if item.lightmap is not None:
                 place = f"objects[{i}].lightmap"
-                used |= {(each.lightmap, side, LIGHT): place for side in LIGHT_SIZES}
+                used |= {(item.lightmap, side, LIGHT): place for side in LIGHT_SIZES}
         present = {(t.base, t.size, t.channel) for t in campus.textures}
         for texture, place in used.items():
             if texture not in present:
@@ -113,7 +113,7 @@ class _Check:
         for texture in sorted(present - used.keys()):
             at.add("PTM-D806", f"{texture_file(*texture)} is not used", "textures")
 
-    def _recorded(self, file: MeshFile | TextureFile | RecordFile) -> bytes | None:
+    def _read_recorded(self, file: MeshFile | TextureFile | RecordFile) -> bytes | None:
         """The bytes of a listed file; None, with an issue, if it has other bytes than recorded."""
         data = self.bytes_of(file.file, "PTM-D803", file.bytes)
         if data is None:
@@ -128,14 +128,14 @@ class _Check:
         return data
 
     def _record(self, record: RecordFile) -> None:
-        data = self._recorded(record)
+        data = self._read_recorded(record)
         if data is not None and (wrong := fault_of(data)) is not None:
             self.findings.add("PTM-D804", record.file, "", wrong)
 
-    def _mesh(self, campus: Campus, each: CampusObject, mesh: MeshFile, *, finest: bool) -> None:
+    def _mesh(self, campus: Campus, item: CampusObject, mesh: MeshFile, *, finest: bool) -> None:
         """A client draws the mesh with the materials and the lightmap of its object, and culls it
         by the object's box."""
-        data = self._recorded(mesh)
+        data = self._read_recorded(mesh)
         if data is None:
             return
         at = self.findings.place(mesh.file)
@@ -146,10 +146,10 @@ class _Check:
             return
         if (faces := sum(len(p.triangle) for p in primitives)) != mesh.faces:
             at.add("PTM-D804", f"{faces} faces, not {mesh.faces}")
-        low, high = each.box[:3], each.box[3:]
+        low, high = item.box[:3], item.box[3:]
         if any(((p.point < low) | (p.point > high)).any() for p in primitives):
             at.add("PTM-D804", "extends beyond the bounding box of its object")
-        if not {p.material for p in primitives} <= set(each.materials):
+        if not {p.material for p in primitives} <= set(item.materials):
             at.add("PTM-D804", "the materials do not match its object")
             return
         for part in primitives:
@@ -160,7 +160,7 @@ class _Check:
             if (part.uv is not None) != textured:
                 message = "textures without coordinates, or coordinates without textures"
                 part_at.add("PTM-D804", message)
-            if (part.light is not None) != (finest and each.lightmap is not None):
+            if (part.light is not None) != (finest and item.lightmap is not None):
                 message = "a lightmap without coordinates, or coordinates without one"
                 part_at.add("PTM-D804", message)
             elif part.light is not None and not ((part.light >= 0) & (part.light <= 1)).all():
@@ -170,7 +170,7 @@ class _Check:
         from ptmtools.texture.images.opening import load, open_image, pillow_faults
         from ptmtools.texture.images.picture import check_size
 
-        data = self._recorded(texture)
+        data = self._read_recorded(texture)
         if data is None:
             return
         at = self.findings.place(texture.file)

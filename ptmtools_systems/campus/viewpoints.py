@@ -44,7 +44,7 @@ def viewpoint(around: Occluders, corner: Floats, box: Floats) -> tuple[Vector, V
     place = _candidates(low, high)
     top, ground = _heights(around, place)
     outside = np.column_stack([place[:, 0], top + EYE, place[:, 1]])
-    seen = np.where(top <= ground + STEP, _seen(around, outside, target), 0.0)
+    seen = np.where(top <= ground + STEP, _visible_share(around, outside, target), 0.0)
     eyes = outside
     if not seen.max() > _ALIKE:
         # On a floor, beside the foot of the object first.
@@ -53,7 +53,7 @@ def viewpoint(around: Occluders, corner: Floats, box: Floats) -> tuple[Vector, V
         floor = np.where(floor > head[:, 1] - EYE - STEP, floor, low[1])
         within = np.column_stack([place[:, 0], floor + EYE, place[:, 1]])
         eyes = np.concatenate([outside, within])
-        seen = np.concatenate([seen, _seen(around, within, target)])
+        seen = np.concatenate([seen, _visible_share(around, within, target)])
         if not seen.any():
             # Hidden: anywhere on the ground.
             seen = np.concatenate([(top <= ground + STEP) * 1.0, np.zeros(len(within))])
@@ -78,17 +78,17 @@ def _candidates(low: Floats, high: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         edge = (half / np.abs(way)).min(axis=1)
     across = np.abs(way[:, ::-1]) @ half
-    far = np.maximum(across, (high[1] - low[1]) / 2) / math.tan(_HALF_VIEW)
-    away = np.clip(np.outer(_SHARES, far), NEAREST, FARTHEST)
+    distance = np.maximum(across, (high[1] - low[1]) / 2) / math.tan(_HALF_VIEW)
+    away = np.clip(np.outer(_SHARES, distance), NEAREST, FARTHEST)
     return np.asarray((middle + (edge + away)[..., None] * way).reshape(-1, 2))
 
 
 def _heights(around: Occluders, place: Floats) -> tuple[Floats, Floats]:
     """(n,) heights of the highest and of the lowest surface at (n, 2) places; the ground of the
     scene where there is none."""
-    least, most = around.points[:, 1].min(), around.points[:, 1].max()
-    height = most - least + EYE
-    at = np.column_stack([place[:, 0], np.full(len(place), most + EYE), place[:, 1]])
+    least, highest = around.points[:, 1].min(), around.points[:, 1].max()
+    height = highest - least + EYE
+    at = np.column_stack([place[:, 0], np.full(len(place), highest + EYE), place[:, 1]])
     top = around.upright(at, 2 * height, -1.0)
     under = at.copy()
     under[:, 1] = least - EYE
@@ -104,7 +104,7 @@ def _points_of(corner: Floats) -> Floats:
     return points_on(corner[face], np.arange(1, _POINTS + 1))
 
 
-def _seen(around: Occluders, eyes: Floats, target: Floats) -> Floats:
+def _visible_share(around: Occluders, eyes: Floats, target: Floats) -> Floats:
     """(n,) the share of points that is visible from each of (n, 3) eyes."""
     origin, end = np.repeat(eyes, len(target), axis=0), np.tile(target, (len(eyes), 1))
     return np.asarray(around.free(origin, end).reshape(len(eyes), -1).mean(axis=1))

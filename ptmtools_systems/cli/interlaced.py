@@ -113,10 +113,10 @@ def deinterlace(
     write_image(target, image, force=force)
     height, width, components = image.shape
     kind = "" if interlaced.kind == "uint8" else f" of {interlaced.kind}"
-    most = len(interlaced.parts)
+    file_count = len(interlaced.parts)
     console.print(
         f"{target}: {width} x {height}, {count(components, 'component')}{kind}, "
-        f"{most if step is None else step} of {count(most, 'file')}"
+        f"{file_count if step is None else step} of {count(file_count, 'file')}"
     )
     old = interlaced.original
     if old != (interlaced.width, interlaced.height):

@@ -178,7 +178,7 @@ def campus(
     scene_notes = exterior_notes(result.scene.notes)
     if not console.as_json:
         shown = [*warnings(scene_notes), *(f"note: {note}" for note in result.notes)]
-        for text in shown + [f"note: {line(each)}" for each in scene_notes if console.verbose]:
+        for text in shown + [f"note: {line(note)}" for note in scene_notes if console.verbose]:
             console.warn(text)
     document = {
         **record(result.campus),

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from ptmtools_systems.interlace.model import (
         Axis as Axis,
         Interlaced as Interlaced,
+        InterlacedFile as InterlacedFile,
         InterlaceOptions as InterlaceOptions,
-        Part as Part,
     )
     from ptmtools_systems.interlace.reading import (
         deinterlace as deinterlace,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "ptmtools_systems.interlace.model": "Axis Interlaced InterlaceOptions Part",
+        "ptmtools_systems.interlace.model": "Axis Interlaced InterlacedFile InterlaceOptions",
         "ptmtools_systems.interlace.reading": "deinterlace read_manifest validate_interlaced",
         "ptmtools_systems.interlace.steps": "join split",
         "ptmtools_systems.interlace.writing": "interlace write_folder",

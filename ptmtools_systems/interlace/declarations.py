@@ -24,7 +24,5 @@ INTERLACED = Emitter(
     reader=Lazy("ptmtools_systems.interlace.database:read_file"),
     check=Lazy("ptmtools_systems.interlace.database:check_files"),
     texture_files="interlace/{name}/",
-    site=SiteTextures(
-        "sets", "data/sets", Lazy("ptmtools_systems.interlace.site_sets:set_entries")
-    ),
+    site=SiteTextures("sets", "data/sets", Lazy("ptmtools_systems.interlace.database:set_entries")),
 )

@@ -34,7 +34,7 @@ class InterlaceOptions:
 
 
 @dataclass(frozen=True)
-class Part:
+class InterlacedFile:
     """One file, and the image that all files up to it make.
 
     Attributes
@@ -79,7 +79,7 @@ class Interlaced:
     components: int
     kind: str
     min: int
-    parts: tuple[Part, ...]
+    parts: tuple[InterlacedFile, ...]
 
     @property
     def texel_bytes(self) -> int:
@@ -99,10 +99,10 @@ class Interlaced:
         return document
 
     @staticmethod
-    def of(document: Mapping[str, Any]) -> Interlaced:
+    def from_document(document: Mapping[str, Any]) -> Interlaced:
         """The manifest in a valid document."""
-        parts = tuple(_known(Part, file) for file in document["files"])
-        manifest: Interlaced = _known(Interlaced, {**document, "parts": parts})
+        parts = tuple(_from_row(InterlacedFile, file) for file in document["files"])
+        manifest: Interlaced = _from_row(Interlaced, {**document, "parts": parts})
         return manifest
 
 
@@ -110,7 +110,7 @@ def _sides(size: Size) -> dict[str, int]:
     return {"width": size[0], "height": size[1]}
 
 
-def _known(cls: Any, row: Mapping[str, Any]) -> Any:
+def _from_row(cls: Any, row: Mapping[str, Any]) -> Any:
     """The record of a class: members that are unknown are ignored, sizes become pairs."""
     values = {name: row[name] for name in cls.__dataclass_fields__}
     sizes = {n: (v["width"], v["height"]) for n, v in values.items() if isinstance(v, dict)}

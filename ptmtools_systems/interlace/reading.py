@@ -23,7 +23,7 @@ from ptmtools.files import open_below
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools_systems.interlace.containers import CONTAINERS, Texels
-from ptmtools_systems.interlace.model import INDEX, Interlaced, Part, axes_of, sizes_of
+from ptmtools_systems.interlace.model import INDEX, Interlaced, InterlacedFile, axes_of, sizes_of
 from ptmtools_systems.interlace.steps import join
 
 _LIMITS = Limits()
@@ -54,7 +54,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
         )
     data = _bytes_of(Path(folder), INDEX, _MANIFEST_MOST, "a manifest")
     with naming(file):
-        interlaced = Interlaced.of(_document(data))
+        interlaced = Interlaced.from_document(_document(data))
         _check_chain(interlaced)
     return interlaced
 
@@ -100,14 +100,14 @@ def _check_chain(interlaced: Interlaced) -> None:
     require(len(axes) == len(parts) - 1, "a file after the first has no axis")
     sizes = sizes_of(interlaced.width, interlaced.height, axes)
     require(min(sizes[0][0]) > 0, "there are more files than sides that can be halved")
-    for number, (part, (own, joined)) in enumerate(zip(parts, sizes, strict=True)):
+    for number, (part, (extent, joined)) in enumerate(zip(parts, sizes, strict=True)):
         place = f"files[{number}]"
         name = f"{number + 1}.{interlaced.container}"
         require(part.name == name, f"is named {part.name}, not {name}", place)
         require(
-            (part.width, part.height) == own and part.joined == joined,
-            f"must have {own[0]} x {own[1]} texels, joined {joined[0]} x {joined[1]}, by the axes "
-            "and the size of the image",
+            (part.width, part.height) == extent and part.joined == joined,
+            f"must have {extent[0]} x {extent[1]} texels, joined {joined[0]} x {joined[1]}, by the "
+            "axes and the size of the image",
             place,
         )
 
@@ -123,14 +123,14 @@ def deinterlace(
     LimitError: PTM-L104 more texels than ``limits`` allow.
     """
     interlaced = read_manifest(folder)
-    most = len(interlaced.parts)
-    step = most if step is None else step
-    if not 1 <= step <= most:
+    file_count = len(interlaced.parts)
+    step = file_count if step is None else step
+    if not 1 <= step <= file_count:
         raise InputError(
             "PTM-I111",
-            f"step {step} does not exist: it has {count(most, 'file')}",
+            f"step {step} does not exist: it has {count(file_count, 'file')}",
             file=folder,
-            remedy=f"--step is a number from 1 to {most}",
+            remedy=f"--step is a number from 1 to {file_count}",
         )
     check_joined(interlaced, step, limits, folder)
     image = read_part(Path(folder), interlaced, interlaced.parts[0])
@@ -155,7 +155,7 @@ def check_joined(
         )
 
 
-def read_part(folder: Path, interlaced: Interlaced, part: Part) -> Texels:
+def read_part(folder: Path, interlaced: Interlaced, part: InterlacedFile) -> Texels:
     """The (h, w, c) texels of one file.
 
     Raises
@@ -167,12 +167,12 @@ def read_part(folder: Path, interlaced: Interlaced, part: Part) -> Texels:
     return part_texels(folder / part.name, part_bytes(folder, interlaced, part), interlaced, part)
 
 
-def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
+def part_bytes(folder: Path, interlaced: Interlaced, part: InterlacedFile) -> bytes:
     """The bytes of a file, compared with length and checksum; raises as `read_part`."""
     texels = part.width * part.height * interlaced.texel_bytes
-    most = _BYTES * texels + _BYTES_MORE
+    limit = _BYTES * texels + _BYTES_MORE
     content = f"{part.width} x {part.height} texels"
-    data = _bytes_of(folder, part.name, most, content)
+    data = _bytes_of(folder, part.name, limit, content)
     fault = ""
     if len(data) != part.bytes:
         fault = f"has {len(data)} bytes instead of {part.bytes}"
@@ -185,7 +185,7 @@ def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
     return data
 
 
-def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> Texels:
+def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: InterlacedFile) -> Texels:
     """The texels in the bytes of a file; raises InputError PTM-I821."""
     from ptmtools.texture.images import load_image
 
@@ -195,8 +195,8 @@ def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> 
         if not data.startswith(container.magic):
             raise ValueError(f"not a {interlaced.container}")
         # Larger images are refused before decoding; WebP counts four bytes a texel.
-        most = part.width * part.height * max(4, interlaced.texel_bytes)
-        picture = load_image(data, Limits(decoded_bytes=most))
+        limit = part.width * part.height * max(4, interlaced.texel_bytes)
+        picture = load_image(data, Limits(decoded_bytes=limit))
         if picture.texels.shape[:2] != shape[:2]:
             height, width = picture.texels.shape[:2]
             raise ValueError(f"{width} x {height} instead of {part.width} x {part.height} texels")
@@ -213,20 +213,20 @@ def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> 
         ) from None
 
 
-def _bytes_of(folder: Path, name: str, most: int, content: str) -> bytes:
+def _bytes_of(folder: Path, name: str, limit: int, content: str) -> bytes:
     """The bytes of a regular file; raises InputError PTM-I122, LimitError PTM-L204."""
     file = folder / name
     try:
         with open_below(folder, name) as stream:
             length = os.fstat(stream.fileno()).st_size
-            if length > most:
+            if length > limit:
                 raise LimitError(
                     "PTM-L204",
                     f"has {length} bytes, too many for {content}",
                     file=file,
                     remedy=_AGAIN,
                 )
-            return stream.read(most)
+            return stream.read(limit)
     except FileNotFoundError:
         raise InputError(
             "PTM-I122", "is missing", file=file, remedy=f"download it again, or {_AGAIN}"
@@ -259,9 +259,9 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
     end = 0
     for part in interlaced.parts:
         end += part.bytes
-        own, joined = f"{part.width} x {part.height}", f"{part.joined[0]} x {part.joined[1]}"
+        extent, joined = f"{part.width} x {part.height}", f"{part.joined[0]} x {part.joined[1]}"
         lines.append(
-            f"{part.name:<7} {own:>11}  {part.axis or '':<9} {joined:>13} {part.bytes:>13,} "
+            f"{part.name:<7} {extent:>11}  {part.axis or '':<9} {joined:>13} {part.bytes:>13,} "
             f"{part.bytes / interlaced.bytes:>7.2%} {end:>15,}"
         )
     return tuple(lines), interlaced.document()
@@ -311,7 +311,9 @@ def _check_split(interlaced: Interlaced, at: Place) -> None:
         )
 
 
-def _check_part(folder: Path, interlaced: Interlaced, part: Part, decoded: bool, at: Place) -> int:
+def _check_part(
+    folder: Path, interlaced: Interlaced, part: InterlacedFile, decoded: bool, at: Place
+) -> int:
     """Checks one file; returns the number of bytes read."""
     data = b""
     try:

@@ -56,8 +56,8 @@ def join(first: Texels, second: Texels, axis: Axis) -> Texels:
 
 def stride(axes: Sequence[Axis], step: int) -> tuple[int, int]:
     """(rows, columns): the distances of the lines that the first ``step`` files show."""
-    left = axes[step - 1 :]
-    return 1 << left.count("rows"), 1 << left.count("columns")
+    remaining = axes[step - 1 :]
+    return 1 << remaining.count("rows"), 1 << remaining.count("columns")
 
 
 #: Half the width of the filter, texels.
@@ -73,7 +73,7 @@ def nearest_power(side: int) -> int:
     return below if side * side < 2 * below * below else 2 * below
 
 
-def scaled(image: RowSource, width: int, height: int) -> NDArray[Any]:
+def scale(image: RowSource, width: int, height: int) -> NDArray[Any]:
     """An (h, w, c) image of unsigned integers, 1 to 4 components, at another size.
 
     Of 2 and 4 components the last is alpha.
@@ -87,9 +87,9 @@ def scaled(image: RowSource, width: int, height: int) -> NDArray[Any]:
     for y in range(0, height, step):
         rows = down[y : y + step]
         low, high = int(rows.min()), int(rows.max()) + 1
-        strip = _weighted(np.asarray(image[low:high]).astype(np.float64), top)
-        strip = _filtered(strip, rows - low, down_weight[y : y + step], 0)
-        strip = _filtered(strip, across, across_weight, 1)
+        strip = _premultiply(np.asarray(image[low:high]).astype(np.float64), top)
+        strip = _filter(strip, rows - low, down_weight[y : y + step], 0)
+        strip = _filter(strip, across, across_weight, 1)
         result[y : y + step] = np.floor(np.clip(_plain(strip, top), 0, top) + 0.5)
     return result
 
@@ -112,11 +112,11 @@ def _taps(old: int, new: int) -> tuple[Ints, Floats]:
 def _cubic(x: Floats) -> Floats:
     x = abs(x)
     near = (1.5 * x - 2.5) * x * x + 1.0
-    far = ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0
-    return np.where(x < 1, near, np.where(x < _REACH, far, 0.0))
+    outer = ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0
+    return np.where(x < 1, near, np.where(x < _REACH, outer, 0.0))
 
 
-def _filtered(image: Floats, line: Ints, weight: Floats, axis: int) -> Floats:
+def _filter(image: Floats, line: Ints, weight: Floats, axis: int) -> Floats:
     """An (h, w, c) image whose rows (axis 0) or columns (1) are sums of (n, k) weighted lines."""
     shape = [1, 1, 1]
     shape[axis] = -1
@@ -129,7 +129,7 @@ def _filtered(image: Floats, line: Ints, weight: Floats, axis: int) -> Floats:
     return total
 
 
-def _weighted(image: Floats, top: int) -> Floats:
+def _premultiply(image: Floats, top: int) -> Floats:
     """Colours times alpha, 0 to 1, where there is alpha."""
     if image.shape[2] in (2, 4):
         image[:, :, :-1] *= image[:, :, -1:] / top
@@ -137,7 +137,7 @@ def _weighted(image: Floats, top: int) -> Floats:
 
 
 def _plain(image: Floats, top: int) -> Floats:
-    """The inverse of `_weighted`; colours of transparent texels are 0."""
+    """The inverse of `_premultiply`; colours of transparent texels are 0."""
     if image.shape[2] in (2, 4):
         alpha = image[:, :, -1:] / top
         seen = alpha > 0

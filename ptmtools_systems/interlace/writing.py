@@ -21,12 +21,12 @@ from ptmtools_systems.interlace.model import (
     FORMAT,
     INDEX,
     Interlaced,
+    InterlacedFile,
     InterlaceOptions,
-    Part,
     axes_of,
     sizes_of,
 )
-from ptmtools_systems.interlace.steps import nearest_power, scaled, split
+from ptmtools_systems.interlace.steps import nearest_power, scale, split
 
 _OPTIONS, _LIMITS = InterlaceOptions(), Limits()
 #: Files of such a folder besides its index.
@@ -51,7 +51,7 @@ class Written:
     files: tuple[bytes, ...]
     notes: tuple[str, ...]
 
-    def named(self) -> Iterator[tuple[str, bytes]]:
+    def named_files(self) -> Iterator[tuple[str, bytes]]:
         """Name and bytes of each file of the folder, the manifest last."""
         for part, data in zip(self.interlaced.parts, self.files, strict=True):
             yield part.name, data
@@ -75,7 +75,7 @@ def interlace(
     if picture.description.orientation != 1:
         picture = picture.upright()
         notes.append("turned upright, as its EXIF orientation says")
-    if _coloured(picture.description):
+    if _declares_colors(picture.description):
         notes.append("the files carry no colour profile or gamma: texels are as they were stored")
     if len(picture.texels.shape) == 2:  # an .npy of grey
         picture = replace(picture, texels=picture.array())
@@ -89,7 +89,7 @@ def interlace(
     if (width, height) == (old_width, old_height):
         image = picture.array()
     else:
-        image = scaled(picture.texels, width, height)
+        image = scale(picture.texels, width, height)
         notes.append(
             f"scaled from {old_width} x {old_height} to {width} x {height}, the nearest powers of "
             "two; the files hold the scaled image"
@@ -98,10 +98,10 @@ def interlace(
     parts, files = [], []
     for number, texels in enumerate(split(image, axes)):
         data = container.write(np.ascontiguousarray(texels), options.quality)
-        own, joined = sizes[number]
+        size, joined = sizes[number]
         axis = axes[number - 1] if number else None
         name = f"{number + 1}.{options.format}"
-        parts.append(Part(name, *own, len(data), zlib.crc32(data), axis, joined))
+        parts.append(InterlacedFile(name, *size, len(data), zlib.crc32(data), axis, joined))
         files.append(data)
     interlaced = Interlaced(
         width,
@@ -117,17 +117,20 @@ def interlace(
     return Written(interlaced, tuple(files), tuple(notes))
 
 
-def _coloured(description: Description) -> bool:
+def _declares_colors(description: Description) -> bool:
     """Whether colours are declared to be others than those of sRGB, which untagged files have."""
     described = description.gamma is not None or description.chromaticities is not None
     return description.icc is not None or (described and description.srgb is None)
 
 
 def _check_options(options: InterlaceOptions) -> None:
-    for name, value, most in (("min", options.min, MAX_SIDE), ("quality", options.quality, 100)):
-        if not 1 <= value <= most:
+    for name, value, greatest in (
+        ("min", options.min, MAX_SIDE),
+        ("quality", options.quality, 100),
+    ):
+        if not 1 <= value <= greatest:
             raise InputError(
-                "PTM-I111", f"--{name} {value} is not possible", remedy=f"use 1 to {most}"
+                "PTM-I111", f"--{name} {value} is not possible", remedy=f"use 1 to {greatest}"
             )
     if options.format not in CONTAINERS:
         raise InputError(
@@ -140,4 +143,4 @@ def _check_options(options: InterlaceOptions) -> None:
 def write_folder(folder: str | os.PathLike[str], written: Written, *, force: bool = False) -> None:
     """Write an interlaced image to a folder, whole or not at all; raises what `FolderForm.write`
     raises."""
-    FORM.write(folder, written.named(), force=force)
+    FORM.write(folder, written.named_files(), force=force)

@@ -65,7 +65,7 @@ class ReplacingJob(Job):
         has_list = OCTREE_LIST in artifacts.outputs(APO)
         if has_list and numbers != replacement.objects.tolist():
             raise ValueError(f"{arrays_of(APO.name)} and {OCTREE_LIST} are of other objects")
-        return replacement.of(artifacts.original(SCENE))
+        return replacement.apply_to(artifacts.original(SCENE))
 
     @staticmethod
     def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
@@ -82,13 +82,15 @@ class ReplacingJob(Job):
         return not work.parameters["apo"] and not (before and before.outputs)
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """Raises the errors of `replaced`."""
+        """Raises the errors of `replace_objects`."""
         if not self.options.apo:
             return replace(work, counts={"octrees": 0})
-        from ptmtools_systems.apo.replacing import replaced
+        from ptmtools_systems.apo.replacing import replace_objects
 
         run = self.run
-        result = replaced(run.original(SCENE), self.options, run.workers.executor, run.progress)
+        result = replace_objects(
+            run.original(SCENE), self.options, run.workers.executor, run.progress
+        )
         rows = []
         files = octree_files(thing.name for thing in result.objects)
         for file, thing in zip(files, result.objects, strict=True):
@@ -150,9 +152,9 @@ def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str,
     """The row of an octree in the list, and its stream."""
     import numpy as np
 
-    from ptmtools_systems.apo.files import streamed
+    from ptmtools_systems.apo.files import encode_stream
 
-    data, levels = streamed(octree.texels, octree)
+    data, levels = encode_stream(octree.texels, octree)
     row = {
         "object": replaced.name,
         "number": replaced.object,
@@ -169,7 +171,7 @@ def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str,
     return row, data
 
 
-def represented(artifacts: Artifacts) -> Represented:
+def octree_objects(artifacts: Artifacts) -> Represented:
     """The objects with octree textures; raises PTM-D004 to PTM-D006."""
     from ptmtools.output.representation import Represented
 
@@ -262,7 +264,7 @@ APO: Stage[Scene] = Stage(
     reads=_reads,
     changes=SCENE,
     origin=Lazy(f"{__name__}:replaced_origin"),
-    representation=Lazy(f"{__name__}:represented"),
+    representation=Lazy(f"{__name__}:octree_objects"),
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=lambda scene: {"triangles": len(scene.triangles)},
     summary=_summary,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools_systems.apo.normal_map import NormalMap
-    from ptmtools_systems.apo.reliefs import Replacing
+    from ptmtools_systems.apo.replacing import Replacing
 
 #: A greater share of texels whose rays miss the original is reported.
 _MISSED = 0.01
@@ -47,7 +47,7 @@ class Mapped:
     options: TextureOptions
 
 
-def mapped(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
+def bake_map(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
     """The normal map of an object, and its files as `encoded_image` returns them."""
     number, stem = task
     relief = shared.replacing.normal_map(number)
@@ -63,8 +63,7 @@ class ReliefJob(Job):
         objects = scene_origin(run).objects
         if not len(objects) or run.recorded(APO).relief != "normal-map":
             return described(work, {"maps": 0}, ())
-        from ptmtools_systems.apo.reliefs import Replacing, object_maps
-        from ptmtools_systems.apo.replacing import apo_options
+        from ptmtools_systems.apo.replacing import Replacing, apo_options, object_maps
 
         # Workers need no images.
         scene, shown = replace(run.original(SCENE), images=()), replace(run[APO], images=())
@@ -72,7 +71,7 @@ class ReliefJob(Job):
         names = [shown.objects[number] for number in objects.tolist()]
         tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
         shared = Mapped(replacing, run.recorded(TEXTURES))
-        maps, total = baked(run, transaction, mapped, shared, tasks, "normal maps")
+        maps, total = baked(run, transaction, bake_map, shared, tasks, "normal maps")
         notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
         reliefs = object_maps(shown, objects, maps)
         run.keep(RELIEF, reliefs)
@@ -101,7 +100,7 @@ def relief_files(artifacts: Artifacts, reliefs: ObjectMaps | None) -> dict[int, 
     return dict(zip(numbers, map(ptm_file, relief_stems(names)), strict=True))
 
 
-def represented(artifacts: Artifacts) -> Represented | None:
+def relief_objects(artifacts: Artifacts) -> Represented | None:
     """The objects with normal maps; None without any."""
     from ptmtools.output.representation import Represented
     from ptmtools.pipeline.stages.emit import read_records
@@ -152,7 +151,7 @@ RELIEF: Stage[ObjectMaps] = Stage(
     recipe=1,
     options=ReliefOptions,
     reads=(SCENE,),
-    representation=Lazy(f"{__name__}:represented"),
+    representation=Lazy(f"{__name__}:relief_objects"),
     inputs=_inputs,
     heeds=(APO, TEXTURES),
     artifact=Lazy("ptmtools.output.object_maps:ObjectMaps"),

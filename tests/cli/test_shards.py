@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.cli import encoding
-from ptmtools.cli.batch import Job, Shard
+from ptmtools.cli.batch import FileJob, Shard
 from ptmtools.texture.images.png import png_bytes
 from tests.conftest import files_below
 from tests.e2e.conftest import Ptm, ptm
@@ -35,13 +35,13 @@ def scans(tmp_path: Path) -> Path:
 
 @given(st.sets(st.text("abc/", min_size=1, max_size=8), max_size=40), st.integers(1, 9))
 def test_every_job_is_in_one_part(names: set[str], count: int) -> None:
-    jobs = [Job(f"/data/{name}") for name in sorted(names)] + [Job("")]
+    jobs = [FileJob(f"/data/{name}") for name in sorted(names)] + [FileJob("")]
     parts = [Shard(number + 1, count).jobs(jobs) for number in range(count)]
     assert Counter(job.source for part in parts for job in part) == Counter(j.source for j in jobs)
 
 
 def test_parts_are_of_similar_size() -> None:
-    jobs = [Job(f"/data/{n // 100}/albedo{n % 100}.png") for n in range(8000)]
+    jobs = [FileJob(f"/data/{n // 100}/albedo{n % 100}.png") for n in range(8000)]
     sizes = [len(Shard(number, 16).jobs(jobs)) for number in range(1, 17)]
     # Five standard deviations of a binomial distribution are 108.
     assert all(abs(size - 500) < 108 for size in sizes)
@@ -49,8 +49,10 @@ def test_parts_are_of_similar_size() -> None:
 
 def test_the_part_of_an_image_depends_on_no_machine_and_no_other_image() -> None:
     names = [f"{n}/a.png" for n in range(30)]
-    here = Shard(2, 5).jobs([Job(f"/mnt/here/{name}") for name in names])
-    there = Shard(2, 5).jobs([Job(f"/elsewhere/{name}") for name in [*reversed(names), "new.png"]])
+    here = Shard(2, 5).jobs([FileJob(f"/mnt/here/{name}") for name in names])
+    there = Shard(2, 5).jobs(
+        [FileJob(f"/elsewhere/{name}") for name in [*reversed(names), "new.png"]]
+    )
     one = {job.source.removeprefix("/mnt/here/") for job in here}
     other = {job.source.removeprefix("/elsewhere/") for job in there}
     assert one == other - {"new.png"}

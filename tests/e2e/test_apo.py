@@ -12,7 +12,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.output.gltf_reader import read_glb
-from ptmtools_systems.apo.files import inflated
+from ptmtools_systems.apo.files import inflate_texels
 from ptmtools_systems.apo.model import Octree
 from ptmtools_systems.apo.octree import fault_of
 from ptmtools_systems.apo.traversal import look_up
@@ -102,7 +102,7 @@ def test_statues_can_be_lit_by_what_is_served(tmp_path: Path, ptm: Ptm) -> None:
             row = rows[name]
             data = (www / row["file"]).read_bytes()
             start = np.concatenate([[0], np.cumsum(row["levels"])])
-            texels = inflated(data, start, row)
+            texels = inflate_texels(data, start, row)
             low, side = np.array(row["cube"]["low"]), row["cube"]["side"]
             octree = Octree(texels, start, low, side)
             assert fault_of(octree) is None

@@ -24,7 +24,7 @@ from ptmtools.output.served import Served, read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.rendering.rays import Caster, RayCamera  # noqa: E402
 from ptmtools.rendering.records import Sight  # noqa: E402
-from ptmtools_systems.apo.normal_map import looked_up  # noqa: E402
+from ptmtools_systems.apo.normal_map import look_up_normals  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 WIDTH, HEIGHT = 320, 240
@@ -136,7 +136,7 @@ def normals_of(served: Served, sight: Sight, chosen: np.ndarray) -> np.ndarray:
     (number,) = np.unique(relief.number[face]).tolist()
     image = served.index["textures"][number]["fallback"]
     texels = np.asarray(Image.open(served.folder / image).convert("RGB"))
-    return looked_up(texels, place * [1, -1] + [0, 1], relief.frame[face])
+    return look_up_normals(texels, place * [1, -1] + [0, 1], relief.frame[face])
 
 
 def test_frames_are_as_gltf_demands(database: Path) -> None:

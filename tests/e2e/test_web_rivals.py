@@ -23,7 +23,7 @@ from PIL import Image
 from ptmtools.glb import BINARY, glb_chunks
 from ptmtools.output.served import read_served
 from ptmtools.scene.model import Scene, SourceImage
-from ptmtools.site.entry import Entry, link_bytes
+from ptmtools.site.entry import SiteEntry, link_bytes
 from ptmtools.site.throttle import LATE, Throttle
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -88,7 +88,7 @@ window.rival = { complete: true };
 BYTES = 100_000
 
 
-def page_of(entries: list[Entry]) -> Entrant:
+def page_of(entries: list[SiteEntry]) -> Entrant:
     return Entrant("page", {entry.name: entry for entry in entries})
 
 
@@ -112,8 +112,8 @@ def _nginx(require: Callable[[str, str], None]) -> None:
 
 @pytest.mark.parametrize("http", HTTP)
 def test_a_page_is_seen_as_it_comes(browser: Any, own: Certificate, http: str) -> None:
-    html = Entry("index.html", PAGE.encode(), "text/html")
-    page = page_of([html, Entry("file", bytes(BYTES), "text/plain")])
+    html = SiteEntry("index.html", PAGE.encode(), "text/html")
+    page = page_of([html, SiteEntry("file", bytes(BYTES), "text/plain")])
     link, slow = Throttle(800_000, 0.1), Throttle(100_000, 0.1)
     run = watch(browser, page, link, own, http=http)
     assert run.messages == ()
@@ -144,8 +144,8 @@ def test_a_page_is_seen_as_it_comes(browser: Any, own: Certificate, http: str) -
 def test_files_arrive_compressed_and_in_ranges(own: Certificate) -> None:
     text = b"much the same " * 1000
     files = [
-        Entry("index.html", text, "text/html", compressed=True),
-        Entry("data/a.ptm", bytes(range(256)) * 40, "application/octet-stream"),
+        SiteEntry("index.html", text, "text/html", compressed=True),
+        SiteEntry("data/a.ptm", bytes(range(256)) * 40, "application/octet-stream"),
     ]
     with nginx({entry.name: entry for entry in files}, "1.1", own) as server:
         url = f"http://127.0.0.1:{server.port}/"
@@ -277,8 +277,8 @@ def test_runs_are_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(results, "RESULTS", tmp_path)
     picture = np.random.default_rng(1).integers(256, size=(6, 8, 3), dtype=np.uint8)
     run = Timeline(np.arange(2.0), np.arange(2.0), (picture[:3], picture), 1.0, 2.0, 3, 4, ("a",))
-    page = page_of([Entry("index.html", b"one", "text/html")])
-    other = page_of([Entry("index.html", b"two", "text/html")])
+    page = page_of([SiteEntry("index.html", b"one", "text/html")])
+    other = page_of([SiteEntry("index.html", b"two", "text/html")])
     conditions = Conditions(Throttle(1e6, 0.1), "2", 0, 60)
     measured: list[str] = []
 

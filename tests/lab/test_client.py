@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 
 from ptmtools.link import Conditions
-from ptmtools_lab.client import FileKind, Files, Range
+from ptmtools_lab.client import ClientFiles, FileKind, Range
 from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies.whole_files import LruClient
 from tests.lab.worlds import catalogue, raw, standing
@@ -22,7 +22,7 @@ ACTS = st.lists(
 @given(ACTS)
 def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
     """Whole ranges count."""
-    files = Files(FileKind.TEXTURE, np.array([1000, 200]))
+    files = ClientFiles(FileKind.TEXTURE, np.array([1000, 200]))
     held = np.zeros(200, dtype=bool)
     under_way: list[Range] = []
     for act, number in acts:

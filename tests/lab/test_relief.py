@@ -34,7 +34,8 @@ from ptmtools_lab.simulation import WalkRun, simulate
 from ptmtools_lab.tables import Drawing
 from ptmtools_lab.world import World, prepare, relief_of
 from ptmtools_systems.apo.lighting import descend, lamp, stop_of
-from ptmtools_systems.apo.served_octrees import Octrees, no_octrees, read_octrees
+from ptmtools_systems.apo.model import Octrees
+from ptmtools_systems.apo.served_octrees import no_octrees, read_octrees
 from ptmtools_systems.apo.traversal import look_up, stop_depth
 from tests.lab.conftest import Ptm
 from tests.lab.worlds import SEEDS, catalogue, raw

@@ -17,7 +17,7 @@ from ptmtools.output import EmitOptions, validate_database
 from ptmtools.texture import decode
 from ptmtools.texture.images import Picture
 from ptmtools_systems.interlace import deinterlace, interlace, read_manifest
-from ptmtools_systems.interlace.steps import scaled
+from ptmtools_systems.interlace.steps import scale
 from tests.output.agreement import disagreements
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
@@ -72,7 +72,7 @@ def test_each_texture_has_a_set_of_its_finest_level(whole: Path) -> None:
         assert manifest.original == (row["width"], row["height"])
         assert manifest.components == row["components"]
         if (manifest.width, manifest.height) != manifest.original:
-            texels = scaled(texels, manifest.width, manifest.height)
+            texels = scale(texels, manifest.width, manifest.height)
         assert np.array_equal(deinterlace(folder), texels)
         counts[row["width"], row["height"]] = len(manifest.parts)
     assert counts == {(256, 256): 3, (300, 200): 3, (64, 64): 1}
@@ -162,7 +162,7 @@ def test_a_set_of_other_texels(db: Path) -> None:
         texels[3, 5] ^= 1
         written = interlace(Picture(texels))
         old = json.loads((folder / "interlace.json").read_text())["original"]
-        for name, data in written.named():
+        for name, data in written.named_files():
             (folder / name).write_bytes(data if isinstance(data, bytes) else data.encode())
         edited(lambda d, old=old: d.update(original=old))(folder)
         assert read_manifest(folder).original == manifest.original

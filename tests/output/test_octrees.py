@@ -16,7 +16,7 @@ from ptmtools.output import EmitExtras, EmitOptions, emit, validate_database
 from ptmtools.output.names import HINTS
 from ptmtools.output.representation import Represented
 from ptmtools_systems.apo.declarations import OCTREES
-from ptmtools_systems.apo.files import streamed
+from ptmtools_systems.apo.files import encode_stream
 from ptmtools_systems.stages.apo import OctreeRecord
 from tests.output.agreement import disagreements
 from tests.output.damage import (
@@ -44,7 +44,7 @@ def put_octrees(www: Path) -> Represented:
     records = []
     for number, (name, stem, depth) in enumerate(OBJECTS):
         octree = ball(depth, LOW, SIDE)
-        data, levels = streamed(octree.texels, octree)
+        data, levels = encode_stream(octree.texels, octree)
         (www / f"apo/{stem}.bin").write_bytes(data)
         counts = tuple(np.diff(octree.start).tolist())
         ends, checks = tuple(levels["ends"]), tuple(levels["crc32"])
@@ -110,7 +110,7 @@ def restreamed(change: Callable[[np.ndarray], object]) -> Damage:
         octree = ball(4, LOW, SIDE)
         texels = octree.texels.copy()
         change(texels)
-        data, levels = streamed(texels, octree)
+        data, levels = encode_stream(texels, octree)
         (db / "www" / FIRST).write_bytes(data)
         row(lambda r: r.update(levels))(db)
 

@@ -17,12 +17,12 @@ from ptmtools.texture import load_image, read_header
 from ptmtools.texture.detail import Detail, compare_levels, detail_of
 from ptmtools.texture.reader import decode_levels
 from ptmtools.texture.samples import KINDS, in_eight_bits
-from ptmtools_systems.apo.files import inflated
+from ptmtools_systems.apo.files import inflate_texels
 from ptmtools_systems.apo.model import Octree
 from ptmtools_systems.apo.octree import fault_of
 from ptmtools_systems.apo.traversal import look_up
 from ptmtools_systems.interlace import deinterlace, read_manifest
-from ptmtools_systems.interlace.steps import scaled
+from ptmtools_systems.interlace.steps import scale
 
 #: Relative slack of `differences` of levels, which are rounded, and summed in another order here.
 DIFFERENCE_SLACK = 0.01
@@ -111,7 +111,7 @@ def _set(folder: Path, row: Mapping[str, Any], finest: Any, kind: Any) -> str:
         joined = deinterlace(folder)
         texels = in_eight_bits(finest) if finest.dtype.kind == "f" else finest
         if texels.shape[:2] != (interlaced.height, interlaced.width):
-            texels = scaled(texels, interlaced.width, interlaced.height)
+            texels = scale(texels, interlaced.width, interlaced.height)
         differ = int((texels.reshape(joined.shape) != joined).any(axis=-1).sum())
         return f"{differ} texels differ" if differ else ""
     return ""
@@ -184,7 +184,7 @@ def _bare(www: Path, row: Mapping[str, Any], q: Any) -> float:
     """The share of an object's points without a texel in its octree."""
     start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
     data = (www / unquote(row["file"])).read_bytes()
-    texels = inflated(data, start, row)
+    texels = inflate_texels(data, start, row)
     octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
     if not len(q) or fault_of(octree):
         return 0.0

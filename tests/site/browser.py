@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.serving import serving
 from ptmtools.site.throttle import Throttle, Visits
 
@@ -178,7 +178,7 @@ def hurried(page: Any) -> None:
 @contextmanager
 def visiting(
     browser: Any,
-    entries: Mapping[str, Entry],
+    entries: Mapping[str, SiteEntry],
     *,
     query: str = "",
     width: int = 640,
@@ -214,7 +214,7 @@ def new_page(
 
 
 def visiting_in(
-    page: Any, entries: Mapping[str, Entry], *, query: str = ""
+    page: Any, entries: Mapping[str, SiteEntry], *, query: str = ""
 ) -> AbstractContextManager[Visitor]:
     """Leads a page to a site, and away from it in the end: a page takes longer to start than a
     small site to come. Each site has another origin, so that nothing of the one before is left."""
@@ -224,7 +224,7 @@ def visiting_in(
 @contextmanager
 def _visiting(
     page: Any,
-    entries: Mapping[str, Entry],
+    entries: Mapping[str, SiteEntry],
     query: str,
     throttle: Throttle | None,
     leave: Callable[[], object],

@@ -28,7 +28,7 @@ import numpy as np
 from browser import COUNTING, HIDING, Visitor, image_of
 from numpy.typing import NDArray
 
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.serving import serving
 from ptmtools.site.throttle import Throttle, Visits
 
@@ -368,7 +368,7 @@ class EngineVisitor(Visitor):
 @contextmanager
 def visiting_by(
     engine: Engine,
-    entries: Mapping[str, Entry],
+    entries: Mapping[str, SiteEntry],
     *,
     query: str = "",
     width: int = 640,

@@ -12,10 +12,10 @@ from typing import Any
 
 from benchmarks.fuzz.mutation import NAMES, damaged, dumped, twisted
 from ptmtools.site.content import Site
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 
 
-def hostile(site: Site, seed: int) -> Mapping[str, Entry]:
+def hostile(site: Site, seed: int) -> Mapping[str, SiteEntry]:
     """The files of a site of which one is hostile: the index for even seeds."""
     random = Random(seed)
     data = {name: entry for name, entry in site.entries.items() if name.startswith("data")}
@@ -55,5 +55,5 @@ def _sealed(tree: Any, name: str, data: bytes) -> bool:
     return sum(_sealed(value, name, data) for value in values) > 0
 
 
-def _with(entry: Entry, data: bytes) -> Entry:
+def _with(entry: SiteEntry, data: bytes) -> SiteEntry:
     return replace(entry, source=data, state=None, digest="")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ptmtools.site.content import Site
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.texture import EncodeOptions, encode_to, read_header
 from ptmtools.texture.model import gpu_texel_bytes
 
@@ -122,7 +122,7 @@ def with_index(site: Site, index: Mapping[str, Any]) -> Site:
     return Site({**site.entries, name: entry}, index)
 
 
-def _row(entries: dict[str, Entry], stem: str, texture: Texture) -> dict[str, Any]:
+def _row(entries: dict[str, SiteEntry], stem: str, texture: Texture) -> dict[str, Any]:
     levels, components = levels_of(texture.texels), texture.texels.shape[2]
     stored = len(levels) if texture.stored is None else texture.stored
     whole, buffer = io.BytesIO(), io.BytesIO()
@@ -165,6 +165,6 @@ def _row(entries: dict[str, Entry], stem: str, texture: Texture) -> dict[str, An
     return row
 
 
-def _add(entries: dict[str, Entry], name: str, data: bytes, media: str) -> str:
-    entries[f"data/{name}"] = Entry(f"data/{name}", data, media)
+def _add(entries: dict[str, SiteEntry], name: str, data: bytes, media: str) -> str:
+    entries[f"data/{name}"] = SiteEntry(f"data/{name}", data, media)
     return name

@@ -14,7 +14,7 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.about import element_tags
 from ptmtools.site.content import Site, SiteOptions, site_of
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.program import ELEMENT, element
 from ptmtools.site.serving import serving
 from ptmtools.tour.starting import first_tour
@@ -50,7 +50,7 @@ def host(chromium: Any, site: str, more: str = "") -> Any:
     tags = element_tags("The museum", ELEMENT, element().read(), site)
     tags = tags.replace("<ptm-walk ", f'<ptm-walk {more} style="width:640px;height:480px" ')
     text = HOST.format(tags=tags).encode()
-    return serving({"index.html": Entry("index.html", text, "text/html; charset=utf-8")})
+    return serving({"index.html": SiteEntry("index.html", text, "text/html; charset=utf-8")})
 
 
 def frame_of(page: Any) -> Any:
@@ -130,7 +130,7 @@ def test_a_frame_without_an_interface_that_begins_at_a_label(
 def test_a_script_of_other_contents_does_not_run(chromium: Any, served: str) -> None:
     tags = element_tags("The museum", ELEMENT, element().read() + b" ", served)
     text = HOST.format(tags=tags).encode()
-    with serving({"index.html": Entry("index.html", text, "text/html; charset=utf-8")}) as url:
+    with serving({"index.html": SiteEntry("index.html", text, "text/html; charset=utf-8")}) as url:
         page = chromium.new_context().new_page()
         with page.expect_console_message(lambda message: "integrity" in message.text):
             page.goto(url)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ptmtools.folder_kinds import folder_kinds
 from ptmtools.link import Conditions
 from ptmtools.site.content import Site
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.forms import form_site
 from ptmtools.texture import open as open_ptm
 from ptmtools.texture.detail import with_offset
@@ -166,14 +166,14 @@ def test_decisions_of_policies(engine: Engine, world: World, tmp_path: Path) -> 
     root = HERE.parents[1]
     files = [*(root / "web").rglob("*.js"), *HERE.glob("*.mjs")]
     names = {str(file.relative_to(root)): file for file in files}
-    entries = {name: Entry(name, file, "text/javascript") for name, file in names.items()}
-    entries["index.html"] = Entry("index.html", b"<head></head>", "text/html")
+    entries = {name: SiteEntry(name, file, "text/javascript") for name, file in names.items()}
+    entries["index.html"] = SiteEntry("index.html", b"<head></head>", "text/html")
     answers = {}
     for policy in ("best", "paper"):
         witness = Witness(world, policy, world.catalogue.whole // 4)
         witness.walk(Conditions(512e3))
         write(tmp_path / policy, witness.document())
-        entries[policy] = Entry(policy, tmp_path / policy, "application/json")
+        entries[policy] = SiteEntry(policy, tmp_path / policy, "application/json")
         answers[policy] = witness.answers
         assert len(answers[policy]) > 50
     with visiting_by(engine, entries) as visitor:

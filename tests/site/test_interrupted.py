@@ -18,7 +18,7 @@ from hypothesis import Phase, example, given, settings, strategies as st
 
 from ptmtools.site import publishing, uploading
 from ptmtools.site.content import Site
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.published import COPY, LIST, PublishOptions, steps_of, steps_of_removal
 from ptmtools.site.publishing import publish
 from ptmtools.store import objects
@@ -49,7 +49,9 @@ class Version:
             names.append("catalogue.html")
         texts |= {"index.html": " ".join([self.title, *names]), "offline.js": self.title}
         entries = {
-            name: Entry(name, f"{text}\n".encode() * 20, "text/x", name.startswith("data/"), True)
+            name: SiteEntry(
+                name, f"{text}\n".encode() * 20, "text/x", name.startswith("data/"), True
+            )
             for name, text in texts.items()
         }
         return Site(entries, {})

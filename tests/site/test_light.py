@@ -17,7 +17,7 @@ from ptmtools.cli.main import main
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.site.content import Site, site_of
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.pictures import pictures
 from tests.site.conftest import PLAIN, Visiting
 from tests.systems.apo.statues import write_rooms
@@ -103,10 +103,10 @@ def test_a_lightmap_is_in_view_with_its_cell(visit: Visiting, site: Site) -> Non
 
 def test_a_lightmap_that_is_damaged_or_missing(visit: Visiting, site: Site) -> None:
     """The walk goes on with the mean light."""
-    entries: dict[str, Entry] = dict(site.entries)
+    entries: dict[str, SiteEntry] = dict(site.entries)
     names = sorted(name for name in entries if "light_" in name)
     first = next(name for name in names if name.endswith(".ptm"))
-    entries[first] = Entry(first, entries[first].read()[:40], entries[first].media)
+    entries[first] = SiteEntry(first, entries[first].read()[:40], entries[first].media)
     for name in set(names) - {first}:
         del entries[name]
     damaged = Site(entries, site.index)

@@ -13,7 +13,7 @@ from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.site.content import Site, site_of
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from tests.site.conftest import PLAIN, Visiting
 from tests.systems.apo.statues import write_rooms
 
@@ -116,7 +116,7 @@ def test_an_object_with_another_texture_for_a_normal_map(
     revisit: Visiting, site: Site, number: int
 ) -> None:
     """0 is the texture of the floor, 99 does not exist."""
-    entries: dict[str, Entry] = dict(site.entries)
+    entries: dict[str, SiteEntry] = dict(site.entries)
     for name, entry in site.entries.items():
         if not name.endswith(".glb"):
             continue
@@ -124,7 +124,7 @@ def test_an_object_with_another_texture_for_a_normal_map(
         for material in document["materials"]:
             if "normal" in material.get("extras", {}):
                 material["extras"]["normal"] = number
-        entries[name] = Entry(name, pack(document, binary), entry.media)
+        entries[name] = SiteEntry(name, pack(document, binary), entry.media)
     changed = Site(entries, site.index)
     with revisit(changed, query=address(0), width=WIDTH, height=HEIGHT) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.lookup import Lookup, entry_lookup, folder_lookup
 from ptmtools.site.responses import app_of
 from ptmtools.site.serving import running, serving
@@ -41,13 +41,13 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Lookup:
     (root / "manifest.json").write_bytes(b"private")
     (root / "wwwsecret").write_bytes(b"private")
     entries = [
-        Entry("index.html", PAGE, "text/html; charset=utf-8", compressed=True),
-        Entry("data/index-0123456789.json", TEXTS, "application/json", True, True),
-        Entry("data/a%20%C3%BC-0123456789.ptm", NOISE, "application/octet-stream", True),
-        Entry("data/file.ptm", www / "noise.ptm", "application/octet-stream"),
-        Entry("data/gone.ptm", www / "gone.ptm", "application/octet-stream"),
-        Entry("data/small.json", b"{}", "application/json", compressed=True),
-        Entry("data/empty.ptm", b"", "application/octet-stream"),
+        SiteEntry("index.html", PAGE, "text/html; charset=utf-8", compressed=True),
+        SiteEntry("data/index-0123456789.json", TEXTS, "application/json", True, True),
+        SiteEntry("data/a%20%C3%BC-0123456789.ptm", NOISE, "application/octet-stream", True),
+        SiteEntry("data/file.ptm", www / "noise.ptm", "application/octet-stream"),
+        SiteEntry("data/gone.ptm", www / "gone.ptm", "application/octet-stream"),
+        SiteEntry("data/small.json", b"{}", "application/json", compressed=True),
+        SiteEntry("data/empty.ptm", b"", "application/octet-stream"),
     ]
     own, others = entry_lookup({entry.name: entry for entry in entries}), folder_lookup(www)
     return lambda name: own(name) or others(name)
@@ -301,7 +301,7 @@ def test_names_with_a_hash_may_be_kept_of_a_published_folder(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("origin", ["*", "https://example.org"])
 def test_pages_of_others_may_read_on_request(origin: str) -> None:
-    with serving({"a": Entry("a", NOISE, "x/y")}, origin=origin) as url, client_of(url) as ask:
+    with serving({"a": SiteEntry("a", NOISE, "x/y")}, origin=origin) as url, client_of(url) as ask:
         part = ask("/a", Origin="https://example.org", Range="bytes=1-2")
         assert part.headers["access-control-allow-origin"] == origin
         assert "Content-Range" in part.headers["access-control-expose-headers"]
@@ -336,7 +336,7 @@ def test_a_small_body_does_not_wait_for_the_acknowledgement_of_its_head(ask: Cli
 
 def test_every_request_is_recorded() -> None:
     visits = Visits()
-    files = {"a": Entry("a", NOISE, "x/y")}
+    files = {"a": SiteEntry("a", NOISE, "x/y")}
     with serving(files, visits=visits) as url, client_of(url) as ask:
         ask("/a?b", Range="bytes=10-19")
         ask("/c%20d")
@@ -366,7 +366,7 @@ def test_header_bytes_are_those_on_the_link(served: str, visits: Visits) -> None
 
 def test_who_goes_away_is_recorded_and_leaves_the_link() -> None:
     visits = Visits()
-    files = {"a": Entry("a", NOISE, "x/y")}
+    files = {"a": SiteEntry("a", NOISE, "x/y")}
     app = app_of(entry_lookup(files), throttle=Throttle(1e6), visits=visits)
     assert isinstance(app, Paced)
     with running(app) as url:
@@ -387,7 +387,7 @@ def test_who_goes_away_is_recorded_and_leaves_the_link() -> None:
 def test_concurrent_responses_of_a_thin_link_are_whole_and_no_faster_than_it() -> None:
     visits = Visits()
     parts = {f"{i}": NOISE[i * 1000 :][:20_000] for i in range(6)}
-    files = {name: Entry(name, data, "x/y") for name, data in parts.items()}
+    files = {name: SiteEntry(name, data, "x/y") for name, data in parts.items()}
     actual = {}
 
     def fetch(url: str, name: str) -> None:
@@ -410,7 +410,7 @@ def test_concurrent_responses_of_a_thin_link_are_whole_and_no_faster_than_it() -
 
 
 def test_the_end_does_not_wait_for_clients() -> None:
-    files = {"a": Entry("a", NOISE, "x/y")}
+    files = {"a": SiteEntry("a", NOISE, "x/y")}
 
     with serving(files, throttle=Throttle(8_000)) as url:  # 700 s for all of it
         where = urlsplit(url)

@@ -22,7 +22,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.site import lookup
 from ptmtools.site.content import SiteOptions
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools.site.lookup import Lookup
 from ptmtools.site.responses import open_entry
 from ptmtools.site.serving import url_of
@@ -213,12 +213,12 @@ def test_what_is_no_database_to_serve(tmp_path: Path, capsys: pytest.CaptureFixt
 class Site:
     """What a database is made into."""
 
-    entries: Mapping[str, Entry]
+    entries: Mapping[str, SiteEntry]
 
 
 def site_of(path: Path, options: SiteOptions) -> Site:
     assert (path / "manifest.json").exists()
-    return Site({"index.html": Entry("index.html", PAGE, "text/html")})
+    return Site({"index.html": SiteEntry("index.html", PAGE, "text/html")})
 
 
 def test_a_site_goes_before_the_files_of_its_database(

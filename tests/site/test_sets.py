@@ -21,7 +21,7 @@ from ptmtools.output.emitters import is_other_form
 from ptmtools.output.served import read_served
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.site.content import Site, site_of
-from ptmtools.site.entry import Entry, is_marked
+from ptmtools.site.entry import SiteEntry, is_marked
 from ptmtools.site.publishing import weight_of
 from ptmtools.site.serving import serving
 from ptmtools.site.throttle import Throttle
@@ -201,7 +201,7 @@ def test_a_lost_context_comes_back(visit: Visiting, hall: Site) -> None:
         assert np.abs(visitor.picture().astype(int) - picture).max() <= 2
 
 
-def damaged(site: Site, changes: Mapping[str, Any]) -> dict[str, Entry]:
+def damaged(site: Site, changes: Mapping[str, Any]) -> dict[str, SiteEntry]:
     """A site whose files end so; each change takes the bytes of a file."""
     entries = dict(site.entries)
     for end, change in changes.items():

@@ -16,7 +16,7 @@ from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.site.client import OVERHEAD, SURROUNDINGS
 from ptmtools.site.content import Site, site_of
-from ptmtools.site.entry import Entry
+from ptmtools.site.entry import SiteEntry
 from ptmtools_lab.allocation import best_step
 from tests.site.conftest import OCTREES, PLAIN, Visiting, build
 from tests.systems.apo.statues import write_rooms
@@ -115,13 +115,13 @@ def test_a_damaged_octree_leaves_the_walk(
 ) -> None:
     eye, yaw = pose(database, 0, 0.9)
     (name,) = (n for n in site.entries if "statue_01" in n)
-    entries: dict[str, Entry] = dict(site.entries)
+    entries: dict[str, SiteEntry] = dict(site.entries)
     data = entries[name].read()
     changed = {"cut": data[:99], "other": data[:50] + bytes(99) + data[149:], "empty": b""}
     if damage == "missing":
         del entries[name]
     else:
-        entries[name] = Entry(name, changed[damage], entries[name].media)
+        entries[name] = SiteEntry(name, changed[damage], entries[name].media)
     damaged = Site(entries, site.index)
     with visit(damaged, query=address(eye, yaw), prepare=hurried) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
@@ -141,7 +141,7 @@ def test_a_level_that_fails_later_leaves_those_before(
     data = site.entries[name].read()
     end = row["ends"][6]
     spoilt = data[:end] + bytes(len(data) - end)
-    entries = {**site.entries, name: Entry(name, spoilt, site.entries[name].media)}
+    entries = {**site.entries, name: SiteEntry(name, spoilt, site.entries[name].media)}
     with revisit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
         assert visitor.page.evaluate(LEVELS)[0] == 7
@@ -153,7 +153,10 @@ def test_a_wrong_row_leaves_the_walk(revisit: Visiting, site: Site, database: Pa
     (name,) = (n for n in site.entries if "/index-" in n)
     document = json.loads(site.entries[name].read())
     del document["octrees"][0]["cube"]
-    entries = {**site.entries, name: Entry(name, json.dumps(document).encode(), "application/json")}
+    entries = {
+        **site.entries,
+        name: SiteEntry(name, json.dumps(document).encode(), "application/json"),
+    }
     with revisit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
         visitor.until("s.complete")
         assert visitor.page.evaluate("window.ptm.errors[0].code") == "PTM-V105"
@@ -255,7 +258,7 @@ def test_all_levels_come_by_worth(visit: Visiting, site: Site, database: Path) -
     assert len(row["differences"]) == len(row["ends"])
     assert max(row["differences"]) > 1
     row["differences"] = [255.0 * (k == 7) for k in range(len(row["ends"]))]
-    index = Entry(name, json.dumps(document).encode(), "application/json")
+    index = SiteEntry(name, json.dumps(document).encode(), "application/json")
     eye, yaw = pose(database, 0, 0.9)
     query = f"?octrees=best{address(eye, yaw)}"
     with visit(Site({**site.entries, name: index}, document), query=query) as visitor:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ptmtools.coverage.backends.opengl import create_context
 from ptmtools_systems.apo.model import Octree
-from ptmtools_systems.apo.shader import LOOK_UP, uploaded
+from ptmtools_systems.apo.shader import LOOK_UP, upload_texels
 from ptmtools_systems.apo.traversal import NEVER, WIDTH
 
 WHOLE = """
@@ -46,7 +46,7 @@ def look_up_by_shader(
         texture.filter = (context.NEAREST, context.NEAREST)
         result = context.texture((width, height), 2, dtype="i4")
         context.framebuffer([result]).use()
-        uploaded(context, octree.texels).use(0)
+        upload_texels(context, octree.texels).use(0)
         texture.use(1)
         program["octree"].value, program["places"].value = 0, 1
         program["texels"].value = len(octree.texels)

@@ -31,7 +31,7 @@ from ptmtools_systems.apo.files import (
     NORMALS,
     OBJ,
     files_of,
-    inflated,
+    inflate_texels,
     read_index,
     read_mesh,
     read_octree,
@@ -97,10 +97,10 @@ def test_any_truncation_decodes_to_the_levels_that_are_whole(written: Path) -> N
     for cut in range(len(data) + 1):
         there = sum(end <= cut for end in index.normals["ends"])
         if there:
-            inflated(data[:cut], index.start[: there + 1], index.normals)
+            inflate_texels(data[:cut], index.start[: there + 1], index.normals)
         if there < index.levels:
             with pytest.raises(InputError, match=f"level {there}"):
-                inflated(data[:cut], index.start[: there + 2], index.normals)
+                inflate_texels(data[:cut], index.start[: there + 2], index.normals)
 
 
 def test_the_mesh_comes_back(written: Path) -> None:
@@ -175,9 +175,9 @@ def rewritten(folder: Path, change: Callable[[np.ndarray], object]) -> None:
     octree = read_octree(folder)
     texels = octree.texels.copy()
     change(texels)
-    from ptmtools_systems.apo.files import streamed
+    from ptmtools_systems.apo.files import encode_stream
 
-    data, levels = streamed(texels, octree)
+    data, levels = encode_stream(texels, octree)
     (folder / NORMALS).write_bytes(data)
     edit(folder, lambda d: d["normals"].update(levels))
 

@@ -14,7 +14,7 @@ from ptmtools.executor import Executor
 from ptmtools.parallel import open_executor
 from ptmtools_systems.apo import blocks
 from ptmtools_systems.apo.blocks import Surface
-from ptmtools_systems.apo.making import ApoTexture, make_apo, welded
+from ptmtools_systems.apo.making import ApoTexture, make_apo, weld
 from ptmtools_systems.apo.model import ApoOptions
 from ptmtools_systems.apo.normals import corner_normals
 from ptmtools_systems.apo.octree import fault_of
@@ -129,11 +129,11 @@ def test_the_number_of_workers_changes_nothing(
 def test_equal_points_are_one() -> None:
     points, triangles = sphere(3, 0.03)
     loose = points[triangles].reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
-    one, other = welded(points, triangles), welded(*loose)
+    one, other = weld(points, triangles), weld(*loose)
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
     zeros = np.array([[0.0, 0, 0], [-0.0, 0, 0], [1, 0, 0]])
-    assert len(welded(zeros, np.array([[0, 1, 2]]))[0]) == 2
+    assert len(weld(zeros, np.array([[0, 1, 2]]))[0]) == 2
 
 
 def test_colours_of_corners_are_kept() -> None:
@@ -220,7 +220,7 @@ def test_memory_does_not_grow_with_a_far_speck(monkeypatch: pytest.MonkeyPatch) 
     points, triangles = sphere(5, 0.03)
     far = np.array([[1000.0, 0, 0], [1000, 1, 0], [1000, 0, 1]])
     sizes = []
-    divided = blocks.divided
+    divided = blocks.divide_work
 
     def watched(work: Any) -> Any:
         actual = divided(work)
@@ -229,7 +229,7 @@ def test_memory_does_not_grow_with_a_far_speck(monkeypatch: pytest.MonkeyPatch) 
             sizes.append(len(blocks.spread(corner, work.spacing).triangle))
         return actual
 
-    monkeypatch.setattr(blocks, "divided", watched)
+    monkeypatch.setattr(blocks, "divide_work", watched)
     made(
         np.concatenate([points, far]),
         np.concatenate([triangles, [[len(points) + k for k in range(3)]]]),

@@ -13,13 +13,13 @@ from ptmtools.light.atlas import unwrap
 from ptmtools.output.object_maps import ObjectMaps, frame_axes
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 from ptmtools.texture import EncodeOptions, encode
-from ptmtools_systems.apo.files import streamed
+from ptmtools_systems.apo.files import encode_stream
 from ptmtools_systems.apo.making import Simple, octree_around, smooth
 from ptmtools_systems.apo.model import ApoOptions
-from ptmtools_systems.apo.normal_map import NormalMap, frames, looked_up, normal_map
+from ptmtools_systems.apo.normal_map import NormalMap, frames, look_up_normals, normal_map
 from ptmtools_systems.apo.normals import corner_normals
-from ptmtools_systems.apo.reliefs import object_maps
-from ptmtools_systems.apo.sampling import Source, at, nearest, spacing_for, spread
+from ptmtools_systems.apo.replacing import object_maps
+from ptmtools_systems.apo.sampling import Source, interpolate, nearest, spacing_for, spread
 from ptmtools_systems.apo.traversal import look_up
 from tests.systems.apo.meshes import scene_of, sphere
 
@@ -53,7 +53,7 @@ def test_the_error_is_what_it_is_said_to_be(
     assert made.missed < 0.001
     _, truth, of, weight = compared(points, triangles, mesh)
     uv = np.einsum("nk,nkx->nx", weight, made.uv[of])
-    shown = looked_up(made.texels, uv, made.frame[of])
+    shown = look_up_normals(made.texels, uv, made.frame[of])
     assert rms(shown, truth) == pytest.approx(made.error, rel=0.1)
     # Of its own the mesh is much farther off.
     own = np.einsum("nk,nkx->nx", weight, mesh.normals[mesh.triangles[of]])
@@ -66,7 +66,10 @@ def compared(
     """Points of the mesh, the source's normals there, and triangles and weights of the points."""
     corner = mesh.points[mesh.triangles]
     some = spread(corner, spacing_for(corner, 20_000))
-    place, normal = at(corner, some), at(mesh.normals[mesh.triangles].astype(float), some)
+    place, normal = (
+        interpolate(corner, some),
+        interpolate(mesh.normals[mesh.triangles].astype(float), some),
+    )
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     low, side = points.min(axis=0) - 0.01, float(np.ptp(points, axis=0).max()) + 0.02
     whole = Source(
@@ -91,7 +94,7 @@ def test_it_takes_fewer_bytes_than_an_octree_of_the_same_error(
     points, triangles = source
     place, truth, _, _ = compared(points, triangles, mesh)
     octree, _ = octree_around(mesh, points, triangles.astype(np.int32), OPTIONS, None, Executor())
-    ends = streamed(octree.texels, octree)[1]["ends"]
+    ends = encode_stream(octree.texels, octree)[1]["ends"]
     q = (place - octree.low) / octree.side
     error = [rms(look_up(octree, q, k + 1).normals, truth) for k in range(octree.levels)]
     as_good = next(k for k, e in enumerate(error) if e <= made.error or k == octree.levels - 1)

@@ -14,16 +14,16 @@ from ptmtools_systems.apo.octree import (
     ENOUGH,
     MARGIN,
     Bounds,
-    Level,
+    OctreeLevel,
     Samples,
-    averaged,
+    average_levels,
     codes_of,
     cube_around,
     divide,
-    joined,
-    pruned,
+    join_levels,
+    prune,
 )
-from ptmtools_systems.apo.sampling import at, spacing_for, spread
+from ptmtools_systems.apo.sampling import interpolate, spacing_for, spread
 
 shares = st.floats(0, 1, exclude_max=True, width=32)
 
@@ -38,14 +38,16 @@ def test_samples_are_as_far_apart_as_asked() -> None:
     assert points.weight.min() > 0
     np.testing.assert_allclose(points.weight.sum(axis=1), 1)
     assert (np.diff(points.triangle) >= 0).all()
-    middle = np.array([at(corner, points)[points.triangle == k].mean(axis=0) for k in range(300)])
+    middle = np.array(
+        [interpolate(corner, points)[points.triangle == k].mean(axis=0) for k in range(300)]
+    )
     np.testing.assert_allclose(middle[large], corner[large].mean(axis=1), atol=0.01)
 
 
 def test_a_thin_triangle_has_samples_along_its_length_and_none_too_many() -> None:
     corner = np.array([[[0, 0, 0], [0.5, 1e-3, 0], [1, 0, 0]]], dtype=float)
     points = spread(corner, 0.02)
-    x = np.sort(at(corner, points)[:, 0])
+    x = np.sort(interpolate(corner, points)[:, 0])
     assert len(x) == 25  # of 50 in a row half as long, half way up
     assert np.diff(x).max() < 0.03
 
@@ -72,7 +74,7 @@ def test_samples_are_about_as_many_as_asked(seed: int, faces: int, thin: float) 
 def test_a_triangle_without_area_has_a_sample_too(corner: Floats) -> None:
     points = spread(corner, 0.1)
     assert len(points.triangle) >= 1
-    assert np.isfinite(at(corner, points)).all()
+    assert np.isfinite(interpolate(corner, points)).all()
 
 
 def plain_code(q: Floats, depth: int) -> int:
@@ -99,7 +101,7 @@ def test_a_cube_holds_its_points_also_in_single_precision(place: float, scale: f
     assert (q >= 0).all()
     assert (q < 1).all()
     assert np.ptp(q, axis=0).max() > 1 - 2 * MARGIN
-    assert (cube.inside(points + 2 * cube.side) < 1).all()
+    assert (cube.coordinates(points + 2 * cube.side) < 1).all()
 
 
 # Division, against the words of the docs on one node after the other.
@@ -127,7 +129,7 @@ def plain(samples: Samples, depth: int, prefix: int, bounds: Bounds, bottom: int
     return (mean / np.linalg.norm(mean) if np.any(mean) else unit), below
 
 
-def nested(levels: list[Level], depth: int = 0, prefix: int = 0) -> Any:
+def nested(levels: list[OctreeLevel], depth: int = 0, prefix: int = 0) -> Any:
     level = levels[depth]
     k = int(np.searchsorted(level.code, np.uint64(prefix)))
     below = [c for c in range(8) if level.children[k] >> c & 1]
@@ -163,13 +165,13 @@ def test_division(codes: Any, seed: int, error: float, colored: bool) -> None:
     colors = rng.random((len(codes), 3)) if colored else None
     bounds = Bounds(error, 0.3, 3)
     samples = made(codes, normals, colors)
-    levels = averaged(divide(samples, 0, 3, bounds))
+    levels = average_levels(divide(samples, 0, 3, bounds))
     alike(nested(levels), plain(samples, 0, 0, bounds, 3))
 
 
 def test_normals_that_cancel_out_have_a_direction_all_the_same() -> None:
     normals = np.tile([[1.0, 0, 0], [-1, 0, 0]], (8, 1))
-    levels = averaged(divide(made(np.zeros(16, int), normals), 0, 2, Bounds(0.1, 1, 2)))
+    levels = average_levels(divide(made(np.zeros(16, int), normals), 0, 2, Bounds(0.1, 1, 2)))
     assert [len(level.code) for level in levels] == [1, 1, 1]
     for level in levels:
         np.testing.assert_allclose(np.linalg.norm(level.value, axis=1), 1)
@@ -196,9 +198,9 @@ def test_parts_make_the_whole() -> None:
         divide(Samples(*(field[rows] for field in vars(samples).values())), 1, 4, bounds)
         for rows in (slice(0, cut), slice(cut, None))
     ]
-    below = joined([pruned(part, whole[1].code) for part in parts], 3)
+    below = join_levels([prune(part, whole[1].code) for part in parts], 3)
     for actual, expected in zip(below, whole[1:], strict=True):
         assert np.array_equal(actual.code, expected.code)
         assert np.array_equal(actual.children, expected.children)
-    none = pruned(parts[0], np.zeros(0, np.uint64))
+    none = prune(parts[0], np.zeros(0, np.uint64))
     assert not any(len(level.code) for level in none)

@@ -16,7 +16,7 @@ from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
 from ptmtools_systems.apo.octree import fault_of
 from ptmtools_systems.apo.options import ReplaceOptions
-from ptmtools_systems.apo.replacing import Replaced, Replacement, replaced
+from ptmtools_systems.apo.replacing import Replaced, Replacement, replace_objects
 from ptmtools_systems.apo.traversal import look_up
 from tests.systems.apo.statues import STATUES, statue, wrapped, write_rooms
 from tests.systems.apo.test_making import source_normals
@@ -38,7 +38,7 @@ def rooms(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def made(rooms: Scene) -> Replaced:
-    return replaced(rooms, OPTIONS, Executor())
+    return replace_objects(rooms, OPTIONS, Executor())
 
 
 def of_object(scene: Scene, name: str) -> np.ndarray:
@@ -105,7 +105,7 @@ def test_what_is_painted_stays_where_it_was(rooms: Scene, made: Replaced) -> Non
 
 def test_the_normals_are_those_of_the_statue(rooms: Scene) -> None:
     rng = np.random.default_rng(2)
-    made = replaced(rooms, replace(OPTIONS, apo_error=0.03, apo_density=60), Executor())
+    made = replace_objects(rooms, replace(OPTIONS, apo_error=0.03, apo_density=60), Executor())
     for each in made.objects:
         assert fault_of(each.octree) is None
         own = of_object(rooms, each.name)
@@ -136,7 +136,7 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
     colors = np.full((len(rooms.triangles), 3, 3), 255, np.uint8)
     colors[own[middle[:, 0] > x]] = [255, 0, 0]
     both = replace(rooms, two_sided=two_sided, colors=colors)
-    scene = replaced(both, replace(OPTIONS, apo=("statue_02",)), Executor()).scene
+    scene = replace_objects(both, replace(OPTIONS, apo=("statue_02",)), Executor()).scene
     assert scene.colors is not None
     own = of_object(scene, "statue_02")
     assert len(own) < 1200
@@ -150,14 +150,14 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
 
 
 def test_light_objects_and_unknown_names(rooms: Scene) -> None:
-    actual = replaced(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Executor())
+    actual = replace_objects(rooms, ReplaceOptions(apo=("*", "bust"), apo_faces=5120), Executor())
     assert actual.scene is rooms
     assert (actual.replacement, actual.objects) == (None, ())
     unknown, light = actual.notes
     assert unknown == "--apo: no object is called 'bust'"
     assert light.startswith("15 objects of --apo have no more triangles than --apo-faces 5,120")
     assert all(isinstance(note, Warned) for note in actual.notes)
-    some = replaced(rooms, replace(OPTIONS, apo=("*",)), Executor())
+    some = replace_objects(rooms, replace(OPTIONS, apo=("*",)), Executor())
     assert [isinstance(note, Warned) for note in some.notes] == [False]
     assert len(some.objects) == 2
 
@@ -169,14 +169,16 @@ def test_what_cannot_be_lighter_stays(rooms: Scene) -> None:
     material[own] = len(rooms.materials) + np.arange(len(own))
     materials = (*rooms.materials, *[rooms.materials[0]] * len(own))
     patched = replace(rooms, triangle_material=material, materials=materials)
-    actual = replaced(patched, replace(OPTIONS, apo=("statue_01",)), Executor())
+    actual = replace_objects(patched, replace(OPTIONS, apo=("statue_01",)), Executor())
     assert actual.scene is patched
     assert "statue_01 stays as modelled: it cannot have fewer triangles" in actual.notes
 
 
 def test_objects_of_one_name_are_two(rooms: Scene) -> None:
     names = tuple("statue" if name in STATUES else name for name in rooms.objects)
-    actual = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor())
+    actual = replace_objects(
+        replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Executor()
+    )
     assert [each.name for each in actual.objects] == ["statue", "statue"]
     assert actual.objects[0].object != actual.objects[1].object
     for each in actual.objects:
@@ -186,17 +188,17 @@ def test_objects_of_one_name_are_two(rooms: Scene) -> None:
 
 
 def test_nothing_is_asked_for(rooms: Scene) -> None:
-    actual = replaced(rooms, ReplaceOptions(), Executor())
+    actual = replace_objects(rooms, ReplaceOptions(), Executor())
     assert actual == Replaced(rooms, None, (), ())
 
 
 def test_workers_and_the_way_through_a_file_change_nothing(rooms: Scene, made: Replaced) -> None:
     assert made.replacement
-    again = Replacement.from_arrays(made.replacement.to_arrays()).of(rooms)
+    again = Replacement.from_arrays(made.replacement.to_arrays()).apply_to(rooms)
     for name, array in made.scene.to_arrays().items():
         assert np.array_equal(array, again.to_arrays()[name]), name
     with open_executor(2) as executor:
-        other = replaced(rooms, OPTIONS, executor)
+        other = replace_objects(rooms, OPTIONS, executor)
     for name, array in made.scene.to_arrays().items():
         assert np.array_equal(array, other.scene.to_arrays()[name]), name
     for one, two in zip(made.objects, other.objects, strict=True):
@@ -210,11 +212,11 @@ def test_holes_that_are_filled_go_the_way_through_a_file(rooms: Scene) -> None:
     kept = np.setdiff1d(np.arange(len(rooms.triangles)), lost)
     names = ("triangles", "uv", "triangle_object", "triangle_material", "two_sided")
     holed = replace(rooms, **{name: getattr(rooms, name)[kept] for name in names})
-    made = replaced(holed, OPTIONS, Executor())
+    made = replace_objects(holed, OPTIONS, Executor())
     assert made.replacement
     assert any("holes are filled" in note for note in made.notes)
     assert (np.diff(made.replacement.source) == 0).any()
-    again = Replacement.from_arrays(made.replacement.to_arrays()).of(holed)
+    again = Replacement.from_arrays(made.replacement.to_arrays()).apply_to(holed)
     for name, array in made.scene.to_arrays().items():
         assert np.array_equal(array, again.to_arrays()[name]), name
 
@@ -240,13 +242,13 @@ def test_a_replacement_that_is_none(rooms: Scene, made: Replaced, name: str, cha
     arrays = made.replacement.to_arrays()
     arrays[name] = change(arrays.get(name, arrays["source"]))
     with pytest.raises(ValueError, match=r".+"):
-        Replacement.from_arrays(arrays).of(rooms)
+        Replacement.from_arrays(arrays).apply_to(rooms)
 
 
 def test_too_many_texels_are_refused(rooms: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ptmtools_systems.apo.octree.ADDRESS_BITS", 8)
     with pytest.raises(LimitError, match=r"statue_01: .*--apo-error.*--apo-depth.*PTM-L400"):
-        replaced(rooms, OPTIONS, Executor())
+        replace_objects(rooms, OPTIONS, Executor())
 
 
 @pytest.mark.parametrize(
@@ -264,7 +266,7 @@ def test_the_model_is_that_of_the_sample_and_statues(rooms: Scene, tmp_path: Pat
 
 def test_an_object_that_is_far_off_once_simplified_is_told(rooms: Scene) -> None:
     name = rooms.objects[-1]
-    reported = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Executor()).notes
+    reported = replace_objects(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Executor()).notes
     assert any(isinstance(note, Warned) and "is off by about" in note for note in reported)
-    fine = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=1000), Executor()).notes
+    fine = replace_objects(rooms, ReplaceOptions(apo=(name,), apo_faces=1000), Executor()).notes
     assert not any("is off by about" in note for note in fine)

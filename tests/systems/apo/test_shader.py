@@ -12,8 +12,8 @@ from ptmtools.coverage.backends.opengl import create_context, is_software
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools_systems.apo import rays
 from ptmtools_systems.apo.picture import RenderOptions, render
-from ptmtools_systems.apo.traversal import look_up, stop_depth, unpacked
-from ptmtools_systems.apo.view import Frame, Look, View, view_of
+from ptmtools_systems.apo.traversal import look_up, stop_depth, unpack_normals
+from ptmtools_systems.apo.view import Look, OctreePicture, OctreeView, view_of
 from tests.systems.apo.building import Node, ball, nodes, octree_of
 from tests.systems.apo.look_up_shader import look_up_by_shader
 from tests.systems.apo.test_normals import sphere
@@ -34,7 +34,7 @@ def draws_in_software() -> bool:
     return software
 
 
-def drawn(levels: int, backend: str, **options: object) -> Frame:
+def drawn(levels: int, backend: str, **options: object) -> OctreePicture:
     octree = ball(5, LOW, SIDE)
     settings = RenderOptions(levels=levels, width=161, height=120, backend=backend, **options)
     return render(octree, *mesh(), settings)
@@ -86,7 +86,7 @@ def test_pixels_show_what_numpy_finds_at_their_places(gl: None, levels: int) -> 
     actual = look_up(octree, shown.place[at], levels, shown.stop[at])
     np.testing.assert_array_equal(shown.address[at], actual.address)
     stored = octree.texels[actual.address, :3].astype(int)
-    normals = np.rint((unpacked(octree.texels[actual.address]) / 2 + 0.5) * 255)
+    normals = np.rint((unpack_normals(octree.texels[actual.address]) / 2 + 0.5) * 255)
     assert np.abs(shown.picture[at] - normals).max() <= 1
     assert np.abs(stored - normals).max() < 3
     assert not shown.picture[~at].any()
@@ -117,7 +117,7 @@ def test_pixels_stop_where_nodes_become_smaller() -> None:
     corners = ((points - LOW) / SIDE)[triangles]
     middle = np.full(3, 0.5)
     for far in (1.0, 3.0, 9.0):
-        view = View(middle + [0, 0, 0.45 + far], middle, 101, 101)
+        view = OctreeView(middle + [0, 0, 0.45 + far], middle, 101, 101)
         shown = rays.draw(octree, corners, corners, view, Look(6))
         wide = 2 * np.tan(np.radians(35 / 2)) * far / 101
         assert shown.stop[50, 50] == stop_depth(np.array([wide * 0.98]))[0]
@@ -130,7 +130,7 @@ def test_levels_come_nearer_to_the_sphere() -> None:
         at = shown.covered
         truth = shown.place[at] - 0.5
         truth /= np.linalg.norm(truth, axis=1, keepdims=True)
-        normals = unpacked(ball(5).texels[shown.address[at]])
+        normals = unpack_normals(ball(5).texels[shown.address[at]])
         errors.append(np.degrees(np.arccos((normals * truth).sum(axis=1).clip(-1, 1))).mean())
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 2

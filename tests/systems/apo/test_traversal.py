@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools_systems.apo.model import Octree
-from ptmtools_systems.apo.traversal import NEVER, Nodes, look_up, stop_depth, unpacked
+from ptmtools_systems.apo.traversal import NEVER, Nodes, look_up, stop_depth, unpack_normals
 from tests.systems.apo.building import Node, nodes, octree_of, walk
 
 RED, GREEN, BLUE, GREY = (255, 128, 128), (128, 255, 128), (128, 128, 255), (0, 128, 128)
@@ -46,7 +46,7 @@ def plain_look_up(
         going = going[on]
         at[going] = address_of[on]
         depth[going] += 1
-    return Nodes(at, depth, unpacked(octree.texels[at]))
+    return Nodes(at, depth, unpack_normals(octree.texels[at]))
 
 
 def test_an_octree_written_down() -> None:

@@ -18,7 +18,7 @@ from ptmtools_systems.campus.making import level_faces, levels
 from ptmtools_systems.campus.meshes import Corners, mesh_bytes, read_mesh
 from ptmtools_systems.campus.model import FORM, CampusMaterial, Names, mesh_file, texture_file
 from ptmtools_systems.campus.objects import notes_on, parts_of
-from ptmtools_systems.campus.textures import jpeg, squared, weighted
+from ptmtools_systems.campus.textures import jpeg, square_image, weight_colors
 from tests.conftest import scene_of
 from tests.systems.campus.models import TILE, texture, wall, write_obj
 
@@ -117,13 +117,13 @@ def test_smaller_textures_are_means(made: Path) -> None:
             actual = np.asarray(image, float)
         assert np.abs(actual.mean(axis=(0, 1)) - source.mean(axis=(0, 1))).max() < 1
     exact = source.reshape(128, 5, 128, 5, 3).mean(axis=(1, 3))
-    ours = np.asarray(squared(texture(640, 640, 3), 128), float)
+    ours = np.asarray(square_image(texture(640, 640, 3), 128), float)
     assert np.abs(ours - exact).max() <= 1
 
 
 def test_larger_textures_are_not_blocks() -> None:
     ramp = Image.fromarray(np.tile(np.linspace(0, 255, 16).astype(np.uint8), (16, 1)))
-    large = np.asarray(squared(ramp, 128), float)
+    large = np.asarray(square_image(ramp, 128), float)
     assert (np.diff(large[64]) >= -1).all()
     assert np.abs(np.diff(large[64])).max() < 6
 
@@ -142,11 +142,11 @@ def test_what_is_not_seen_does_not_fringe_what_is(size: int) -> None:
     clear = np.arange(64) // 7 % 2 == 0
     texels[:, ~clear] = [200, 40, 0]
     alpha = np.where(clear, 0, 255).astype(np.uint8)[None].repeat(64, axis=0)
-    actual = np.asarray(weighted(Image.fromarray(texels), Image.fromarray(alpha), size), int)
-    share = np.asarray(squared(Image.fromarray(alpha), size), int)
+    actual = np.asarray(weight_colors(Image.fromarray(texels), Image.fromarray(alpha), size), int)
+    share = np.asarray(square_image(Image.fromarray(alpha), size), int)
     assert (share > 8).any()
     assert np.abs(actual - [200, 40, 0])[share > 8].max() <= 1
-    plain = np.asarray(squared(Image.fromarray(texels), size), int)
+    plain = np.asarray(square_image(Image.fromarray(texels), size), int)
     assert np.array_equal(actual[share == 0], plain[share == 0])
 
 

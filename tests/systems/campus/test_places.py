@@ -14,7 +14,7 @@ from ptmtools.pipeline.validation import validate
 from ptmtools.scene import IngestOptions
 from ptmtools_systems.campus import CampusOptions, make_campus, read_campus
 from ptmtools_systems.campus.model import HIGHEST_RANK, ICONS
-from ptmtools_systems.campus.places import read_places
+from ptmtools_systems.campus.records import read_places
 
 OBJECTS = [("House_1", "House 1"), ("a_b", "a/b")]
 

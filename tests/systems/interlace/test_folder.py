@@ -187,7 +187,7 @@ def test_the_manifest_is_as_its_schema_says(tmp_path: Path) -> None:
     jsonschema.validate(document, schema)
     schemas.check(document, schemas.INTERLACE)
     assert schema["$id"] == f"urn:ptmtools:interlace:{document['schema']}"
-    assert Interlaced.of(document).document() == document
+    assert Interlaced.from_document(document).document() == document
     assert set(schema["required"]) == set(document)
     assert set(schema["$defs"]["file"]["required"]) == set(document["files"][0])
 
