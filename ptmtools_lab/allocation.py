@@ -127,7 +127,7 @@ def _least(worth: Floats, cost: Ints, column: Ints, kept: int) -> tuple[int, int
 
 
 @kernel
-def offered(
+def choose_sources(
     worth: Floats, have: Ints, previews: Previews, present: Bools,
     step: Floats, source: Ints, last: Ints,
 ) -> None:  # fmt: skip

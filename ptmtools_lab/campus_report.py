@@ -47,7 +47,7 @@ def table(runs: Sequence[CampusRun]) -> list[str]:
     return [*_head("", runs), *(_row(name, [figure(run) for run in runs]) for name, figure in rows)]
 
 
-def received(runs: Sequence[CampusRun]) -> list[str]:
+def received_table(runs: Sequence[CampusRun]) -> list[str]:
     """MB of files received by time, a column for each preset; in brackets the increase since the
     row before."""
     time = runs[0].time
@@ -81,18 +81,18 @@ def document(campus: str, runs: Sequence[CampusRun]) -> dict[str, Any]:
                 "idle": run.idle_share,
                 "pauses": run.pauses,
                 "late": run.late,
-                "delay": _known(run.delay),
+                "delay": _none_if_nan(run.delay),
                 "shown": len(run.delays),
                 "never": run.never,
                 "reused": run.reused,
-                "e": _known(run.e),
+                "e": _none_if_nan(run.e),
             }
             for run in runs
         ],
     }
 
 
-def _known(value: float) -> float | None:
+def _none_if_nan(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 

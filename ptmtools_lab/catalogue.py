@@ -127,10 +127,10 @@ def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
         level_memory = np.cumsum(size.prod(axis=1)) * texel_bytes(texture, paper=paper)
         rows.append(([*ends, *ends[-1:] * (len(size) - len(ends))], level_memory, size))
     stored = np.array([len(texture["ends"]) for texture in textures], dtype=np.int64)
-    return aligned(rows)._replace(stored=stored)
+    return align_columns(rows)._replace(stored=stored)
 
 
-def joined(first: Columns, second: Columns) -> Columns:
+def join_columns(first: Columns, second: Columns) -> Columns:
     """The columns of two lists of textures, one after the other."""
     wide = max(first.ends.shape[1], second.ends.shape[1])
 
@@ -144,7 +144,7 @@ def joined(first: Columns, second: Columns) -> Columns:
     return Columns(*counts, *(both(*pair) for pair in tables))
 
 
-def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
+def align_columns(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
     """Columns of textures with different numbers of them, from each texture's (k,) ``ends`` and
     ``memory`` and (k, 2) ``size``, without the first column."""
     last = np.array([len(row[0]) for row in rows], dtype=np.int64)
@@ -176,7 +176,7 @@ class Shapes:
     high: Floats
     side: Floats
 
-    def joined_with(self, more: Shapes) -> Shapes:
+    def join(self, more: Shapes) -> Shapes:
         """These shapes and others, by cell."""
         order = np.argsort(np.concatenate([self.cell, more.cell]), kind="stable")
         both: dict[str, Any] = {
@@ -327,13 +327,11 @@ class Catalogue:
         table[:rows, wide:] = memory[:, -1:]
         return replace(self, memory=table)
 
-    def joined_with(
-        self, more: Columns, differences: Floats, shapes: Shapes | None = None
-    ) -> Catalogue:
+    def extend(self, more: Columns, differences: Floats, shapes: Shapes | None = None) -> Catalogue:
         """The same catalogue with further textures and shapes after its own; ``differences`` (T',
         K')."""
         tables = (getattr(self, name) for name in Columns._fields)
-        columns = joined(Columns(*tables), more)
+        columns = join_columns(Columns(*tables), more)
         wide = columns.ends.shape[1]
         wider = [
             np.pad(d, ((0, 0), (0, wide - d.shape[1]))) for d in (self.differences, differences)
@@ -342,9 +340,9 @@ class Catalogue:
             self,
             **columns._asdict(),
             differences=np.concatenate(wider),
-            previews=self.previews.among(len(columns.levels)),
+            previews=self.previews.pad_to(len(columns.levels)),
             colors=np.concatenate([self.colors, np.zeros((len(more.levels), 3))]),
-            shapes=self.shapes if shapes is None else self.shapes.joined_with(shapes),
+            shapes=self.shapes if shapes is None else self.shapes.join(shapes),
         )
 
 
@@ -392,15 +390,15 @@ def _existing(columns: Columns) -> Bools:
 
 def _shapes(surfaces: Surfaces) -> Shapes:
     """The shapes, and once more those with a lightmap, as if that was their texture."""
-    shapes, light = _textured(surfaces), surfaces.light
+    shapes, light = _textured_shapes(surfaces), surfaces.light
     if light is None:
         return shapes
-    lit = vars(_textured(light))
+    lit = vars(_textured_shapes(light))
     kept = lit["texture"] >= 0
-    return shapes.joined_with(Shapes(**{name: rows[kept] for name, rows in lit.items()}))
+    return shapes.join(Shapes(**{name: rows[kept] for name, rows in lit.items()}))
 
 
-def _textured(surfaces: Surfaces) -> Shapes:
+def _textured_shapes(surfaces: Surfaces) -> Shapes:
     low, high = surfaces.boxes()
     count = len(low)
     cell, texture = (np.zeros(count, np.int64) for _ in range(2))

@@ -140,7 +140,7 @@ class ClientFiles:
         self._waiting.setdefault(number, {})[end] = False
         return result
 
-    def arrived(self, part: Range) -> None:
+    def receive(self, part: Range) -> None:
         """Marks a range as arrived; ranges before it may be missing."""
         waiting = self._waiting[part.number]
         waiting[part.end] = True
@@ -256,7 +256,7 @@ class Client(ABC):
         self.ask(kind, number, int(files.size[number]), priority)
         return True
 
-    def modelled(self, cells: Ints) -> list[int]:
+    def finest_meshes(self, cells: Ints) -> list[int]:
         """The files that have objects in some cells as modelled."""
         meshes = self.world.catalogue.meshes
         files: list[int] = np.flatnonzero(meshes.finest & np.isin(meshes.cell, cells)).tolist()
@@ -273,13 +273,13 @@ class Client(ABC):
         frustum = self.world.frustum(self.frame)
         return loaded[frustum.meets_boxes(shapes.low[loaded], shapes.high[loaded])]
 
-    def arrived(self, request: Request) -> None:
+    def receive(self, request: Request) -> None:
         """Handles a finished request."""
         assert isinstance(request.tag, Range)
         self.waiting.remove(request)
         if request.following:
             self.waiting.append(request.following)
-        self.files[request.tag.kind].arrived(request.tag)
+        self.files[request.tag.kind].receive(request.tag)
 
     def tick(self) -> None:  # noqa: B027 - most clients do nothing
         """Handles a step of time between frames."""

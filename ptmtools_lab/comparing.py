@@ -153,10 +153,10 @@ def require_hints(served: Served, policies: Sequence[PolicyEntry]) -> None:
             )
 
 
-def counted(world: World, options: SimulateOptions) -> World:
+def apply_counting(world: World, options: SimulateOptions) -> World:
     """The world with texture memory and requested ranges as the options define them."""
-    world = world.changed(lambda w: replace(w, one_range=w.one_range or options.one_range))
-    return world.changed(World.counted_by_paper) if options.paper_bytes else world
+    world = world.change_all(lambda w: replace(w, one_range=w.one_range or options.one_range))
+    return world.change_all(World.counted_by_paper) if options.paper_bytes else world
 
 
 def budget_of(world: World, memory: MemorySize, form: str = PTM) -> int:
@@ -191,7 +191,7 @@ def play(
     InputError: PTM-I701 a policy's hints, or the textures in its form, are missing; PTM-I111.
     MissingComponentError: PTM-M100 with ``flip``, without flip-evaluator.
     """
-    configured = [policy.configured(paper or PaperOptions()) for policy in options.policies]
+    configured = [policy.with_options(paper or PaperOptions()) for policy in options.policies]
     policies: list[PolicyEntry | CampusPolicy] = [*configured, *options.campus_policies]
     cases = [
         (link, memory, policy, name)

@@ -122,7 +122,7 @@ def strip(world: World, played: RunResult, paper: PaperOptions | None = None) ->
     without moving; at `LOCAL` on a link without limit or latency, the paper's local server; and the
     full picture."""
     finished = played.run
-    policy = POLICIES[finished.policy].configured(paper or PaperOptions())
+    policy = POLICIES[finished.policy].with_options(paper or PaperOptions())
     world = policy.in_world(world)
     renderer = FrameRenderer(world, _STRIP_LINES, samples=3)
     sight = renderer.look(world.track.eye[0], world.track.direction[0])

@@ -32,7 +32,7 @@ from ptmtools.progress import Progress
 from ptmtools.rendering.pyramids import mip_levels, mip_sizes, pack_pyramids, rgb
 from ptmtools.rendering.records import Pyramids, Shows
 from ptmtools.texture.model import Limits, gpu_texel_bytes
-from ptmtools_lab.catalogue import Columns, aligned, columns_of
+from ptmtools_lab.catalogue import Columns, align_columns, columns_of
 from ptmtools_systems.interlace.model import Interlaced
 from ptmtools_systems.interlace.reading import check_joined, read_manifest, read_part
 from ptmtools_systems.interlace.steps import join
@@ -90,7 +90,7 @@ def interlaced_columns(served: Served, paper: bool) -> Columns:
         memory = [texel_bytes * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
         ends = [*accumulate(part.bytes for part in parts)]
         rows.append((ends, memory, [part.joined for part in parts]))
-    return aligned(rows)
+    return align_columns(rows)
 
 
 def shows(served: Served, levels: Pyramids, progress: Progress) -> Shows:
@@ -124,7 +124,7 @@ def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
         try:
             texels = read_part(folder, interlaced, part)
         except InputError as fault:
-            raise _damaged(fault) from None
+            raise _damage(fault) from None
         image = texels if image is None or part.axis is None else join(image, texels, part.axis)
         yield rgb(image)
 
@@ -135,7 +135,7 @@ def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:
     try:
         interlaced = read_manifest(folder)
     except (InputError, LimitError) as fault:
-        raise _damaged(fault) from None
+        raise _damage(fault) from None
     if interlaced.original != (row["width"], row["height"]):
         raise DatabaseError(
             "PTM-D006", "is not of the texture that the index has", file=folder, remedy=_AGAIN
@@ -143,7 +143,7 @@ def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:
     return folder, interlaced
 
 
-def _damaged(fault: InputError | LimitError) -> DatabaseError:
+def _damage(fault: InputError | LimitError) -> DatabaseError:
     code = "PTM-D005" if fault.code in ("PTM-I120", "PTM-I122") else "PTM-D006"
     return DatabaseError(code, fault.message, file=fault.file, place=fault.place, remedy=_AGAIN)
 

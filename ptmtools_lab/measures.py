@@ -163,12 +163,12 @@ class Flip:
         """(n,) the mean FLIP of each of the frames."""
         return np.array(
             [
-                self._of(k, run.loaded[f], run.state[f])
+                self._difference(k, run.loaded[f], run.state[f])
                 for k, f in enumerate(self.frame.tolist())
             ]
         )  # fmt: skip
 
-    def _of(self, k: int, loaded: Bools, state: Ints) -> float:
+    def _difference(self, k: int, loaded: Bools, state: Ints) -> float:
         return flip(self._full[k], self._renderer.colors(self._sights[k], loaded, state))
 
 

@@ -71,7 +71,7 @@ class Request:
         self.left = float(self.overhead + self.size)
 
     @property
-    def arrived(self) -> float:
+    def arrived_bytes(self) -> float:
         """Bytes that have arrived, headers included."""
         return self.overhead + self.size - self.left
 
@@ -81,9 +81,9 @@ class Request:
         return self.left + sum(size for size, _ in self.rest)
 
     @property
-    def received(self) -> float:
+    def body_bytes(self) -> float:
         """Bytes of the body, from its beginning, that the client holds."""
-        return max(0.0, self.arrived - self.overhead)
+        return max(0.0, self.arrived_bytes - self.overhead)
 
     @property
     def rank(self) -> tuple[float, int]:
@@ -130,7 +130,7 @@ class FluidLink:
     @property
     def partial(self) -> float:
         """Bytes so far of arriving requests: headers and bodies."""
-        return sum(r.arrived for r in self._arriving)
+        return sum(r.arrived_bytes for r in self._arriving)
 
     def request(
         self,
@@ -182,7 +182,7 @@ class FluidLink:
             )
             whole = self._flow(following) if self._arriving else None
             if whole:
-                return self._finished(whole)
+                return self._finish(whole)
             if last:
                 return None
             self.now = following
@@ -218,7 +218,7 @@ class FluidLink:
         self._arriving.remove(nearest)
         return nearest
 
-    def _finished(self, request: Request) -> Request:
+    def _finish(self, request: Request) -> Request:
         request.ended = self.now
         if request.first_byte is None:
             request.first_byte = self.now

@@ -33,7 +33,7 @@ from ptmtools.rendering.pyramids import full_colors
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
 from ptmtools.site.client import LEAST_DIFFERENCE
-from ptmtools_lab.catalogue import Catalogue, Columns, Shapes, aligned
+from ptmtools_lab.catalogue import Catalogue, Columns, Shapes, align_columns
 from ptmtools_lab.rows import RowSums
 from ptmtools_systems.apo.lighting import depth_of, descend, stop_of
 from ptmtools_systems.apo.model import Octrees
@@ -169,7 +169,7 @@ class Reference:
         """Its surfaces along the rays of ``sight``."""
         return sight._replace(triangle=self.caster.first(sight.eye, sight.ray))
 
-    def shown(self, sight: Sight) -> Floats:
+    def full_picture(self, sight: Sight) -> Floats:
         """(n, 3) its full picture of them, 0 to 255."""
         return full_colors(sight, self.triangles, self.pyramids)
 
@@ -228,7 +228,7 @@ class ReliefTally:
         if reference is not None:
             seen = reference.look(sight)
             depths(seen, reference.triangles, reference_depth)
-            exact = reference.shown(seen)
+            exact = reference.full_picture(seen)
         special, plain = np.zeros(count, dtype=np.bool_), np.empty(count, np.int64)
         given = reference is not None
         mark_special(
@@ -262,7 +262,7 @@ def octree_columns(served: Served) -> Columns:
         across = 1 << np.arange(len(row["levels"]))
         memory = np.cumsum(row["levels"]) * _TEXEL
         rows.append((row["ends"], memory, np.stack([across, across], axis=1)))
-    return aligned(rows)
+    return align_columns(rows)
 
 
 def without_octrees(stock: Catalogue, octrees: Octrees) -> Catalogue:
@@ -276,7 +276,7 @@ def without_octrees(stock: Catalogue, octrees: Octrees) -> Catalogue:
 def with_octrees(stock: Catalogue, served: Served, octrees: Octrees) -> Catalogue:
     """The catalogue of a client that draws octrees; ``stock`` is that of the textures alone."""
     columns = octree_columns(served)
-    extended = stock.joined_with(
+    extended = stock.extend(
         columns, _differences(served, octrees, columns), _shapes(served, octrees)
     )
     # After them, errors that no download reduces; see the package.
@@ -288,7 +288,7 @@ def _with_empty(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
     wide = 1 + int(octrees.levels.max(initial=1))
     last, table = np.zeros(count, np.int64), np.zeros((count, wide), np.int64)
     nothing = Columns(last, last, table, table, np.zeros((count, wide, 2), np.int64))
-    return stock.joined_with(nothing, np.zeros((count, wide)))
+    return stock.extend(nothing, np.zeros((count, wide)))
 
 
 def _differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:

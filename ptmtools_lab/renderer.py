@@ -49,21 +49,21 @@ class FrameRenderer:
     def colors(self, sight: Sight, loaded: Bools, state: Ints) -> Floats:
         """(height, width, 3) 0 to 255, with the loaded geometry of cells (C,) and a state (T,) of
         each texture."""
-        return self._drawn(sight, self._shows, loaded, state)
+        return self._draw(sight, self._shows, loaded, state)
 
     def full(self, sight: Sight) -> Floats:
         """The full picture, whatever the form of the textures: all levels of the pyramids and of
         octrees, or the reference of the walk."""
         relief = self._world.relief
         if relief and relief.reference:
-            return self._picture(relief.reference.shown(relief.reference.look(sight)))
+            return self._picture(relief.reference.full_picture(relief.reference.look(sight)))
         loaded = np.ones(self._world.catalogue.cell_count, dtype=np.bool_)
         last = self._full.last
         if relief:
             last = np.concatenate([last, relief.octrees.levels])
-        return self._drawn(sight, self._full, loaded, last)
+        return self._draw(sight, self._full, loaded, last)
 
-    def _drawn(self, sight: Sight, shows: Shows, loaded: Bools, column: Ints) -> Floats:
+    def _draw(self, sight: Sight, shows: Shows, loaded: Bools, column: Ints) -> Floats:
         from ptmtools.rendering.kernels import shade
         from ptmtools.rendering.normal_maps import show_bumps, show_relief
 

@@ -208,13 +208,13 @@ def _run_document(played: RunResult) -> dict[str, Any]:
     }
     if played.flip is not None:
         figures["flip"] = played.flip
-    rounded: dict[str, Any] = _rounded(figures)
+    rounded: dict[str, Any] = _round_numbers(figures)
     return rounded
 
 
-def _rounded(value: Any) -> Any:
+def _round_numbers(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _rounded(inner) for name, inner in value.items()}
+        return {name: _round_numbers(inner) for name, inner in value.items()}
     return round(value, _DIGITS) if isinstance(value, float) else value
 
 

@@ -97,7 +97,9 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
     for f in range(frames):
         for tick in range(1, client.ticks if f else 0):
             part = tick / client.ticks
-            clock.until(float((1 - part) * world.track.time[f - 1] + part * world.track.time[f]))
+            clock.advance_to(
+                float((1 - part) * world.track.time[f - 1] + part * world.track.time[f])
+            )
             client.tick()
         clock.frame(f)
         column[f], loaded[f] = client.column, client.geometry.whole
@@ -109,7 +111,7 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
             loaded[f], client.column, client.source, state[f], world.colored, shown, drawn,
         )  # fmt: skip
         quality[f] = _quality(client)
-        arriving = sum(request.received for request in client.waiting)
+        arriving = sum(request.body_bytes for request in client.waiting)
         fetched[f] = link.bytes - clock.page_bytes + arriving
         client.fetch()
     resident, offset = stock.memory[texture, column], state - column
@@ -165,7 +167,7 @@ class _Clock:
         self._late: deque[tuple[float, Request]] = deque()
         self.page = self.page_bytes = 0
 
-    def until(self, moment: float) -> None:
+    def advance_to(self, moment: float) -> None:
         """Advances time; the client handles arrivals."""
         while True:
             due = self._late[0][0] if self._late else math.inf
@@ -187,7 +189,7 @@ class _Clock:
         """Advances time to a frame, and updates the client: in a browser several times a second,
         and after arrivals."""
         now = float(self._client.world.track.time[frame])
-        self.until(now)
+        self.advance_to(now)
         self._begun = True
         self._client.glance(frame)
         if self._browser is None or self._news or now - self._looked >= LOOK_SECONDS:
@@ -195,7 +197,7 @@ class _Clock:
             self._client.look(frame)
 
     def _handle(self, finished: Request) -> None:
-        self._client.arrived(finished)
+        self._client.receive(finished)
         self._news = True
         if self._begun:
             self._client.fetch()

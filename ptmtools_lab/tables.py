@@ -220,7 +220,7 @@ def _views(parts: Sequence[ViewRows], owner: NDArray[np.int32], depth: Singles) 
     frame = np.concatenate([rows.frame for rows in parts])
     order = np.argsort(frame, kind="stable")
 
-    def joined(*tables: NDArray[Any]) -> Any:
+    def join(*tables: NDArray[Any]) -> Any:
         wide = max(table.shape[-1] for table in tables)
         if tables[0].ndim > 1:
             # Columns beyond a row's own are never read.
@@ -228,12 +228,12 @@ def _views(parts: Sequence[ViewRows], owner: NDArray[np.int32], depth: Singles) 
         return np.concatenate(tables)[order]
 
     start = np.searchsorted(frame[order], np.arange(len(owner) + 1))
-    _, cell, texture, *tables = (joined(*part) for part in zip(*parts, strict=True))
+    _, cell, texture, *tables = (join(*part) for part in zip(*parts, strict=True))
     error, square, need, sight = tables
     return WalkViews(start, cell, texture, error, square, need, sight, owner, depth)
 
 
-def limited(views: WalkViews, count: Ints) -> WalkViews:
+def limit_levels(views: WalkViews, count: Ints) -> WalkViews:
     """The views with textures that lack their finest levels and have no previews; ``count`` (T,) is
     the number of levels of each. Missing levels stay an error."""
     deepest = int(count.max(initial=1))

@@ -98,7 +98,7 @@ def track_of(served: Served, walk: Walk, rate: float = RATE) -> tuple[Track, Flo
         eye, direction, cell = walk.eye, walk.direction, browser.cell
         if (cell < 0).any():
             cell = np.where(cell < 0, served.locator.cells_along(eye), cell)
-        drawn = _drawn(time, browser.age)
+        drawn = _drawn_frames(time, browser.age)
     else:
         eye, direction = walk.at(time)
         cell = served.locator.cells_along(eye)
@@ -163,7 +163,7 @@ def _require_fitting(browser: Browser, served: Served) -> None:
         )
 
 
-def _drawn(time: Floats, age: Floats) -> Ints:
+def _drawn_frames(time: Floats, age: Floats) -> Ints:
     """(F,) the frame in which the available item buffer of each frame was drawn, -1 without one."""
     # The time of an item buffer is the beginning of its frame, that of a frame its end.
     frames: Ints = np.where(age < 0, -1, np.searchsorted(time, time - age, "right"))

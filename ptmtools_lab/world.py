@@ -134,7 +134,7 @@ class World:
             )
         return self.other_forms[form]
 
-    def changed(self, change: Callable[[World], World]) -> World:
+    def change_all(self, change: Callable[[World], World]) -> World:
         """Applies a change to this world and to its other forms."""
         other_forms = {name: change(world) for name, world in self.other_forms.items()}
         return replace(change(self), other_forms=other_forms)
@@ -151,7 +151,7 @@ class World:
 
     def standing(self, seconds: float) -> World:
         """A visitor who stays at the first frame for this time."""
-        return self.changed(lambda world: replace(world, track=world.track.standing(seconds)))
+        return self.change_all(lambda world: replace(world, track=world.track.standing(seconds)))
 
 
 def prepare(
@@ -228,7 +228,7 @@ def _with_octrees(world: World, catalogue: Catalogue, relief: Relief) -> World:
     from ptmtools_lab.relief import with_octrees, without_octrees
 
     octrees = relief.octrees
-    world = world.changed(lambda w: replace(w, catalogue=without_octrees(w.catalogue, octrees)))
+    world = world.change_all(lambda w: replace(w, catalogue=without_octrees(w.catalogue, octrees)))
     if not octrees.number:
         return world
     names = [form.name for form in FORMS.values() if form.octrees]

@@ -102,7 +102,7 @@ class CampusClient:
         self._sort()
         self.shown = self.loaded & self._room
 
-    def arrived(self, request: Request) -> None:
+    def receive(self, request: Request) -> None:
         """Handles a finished request: its thread goes on."""
         file = int(request.tag)  # type: ignore[call-overload]
         self.loaded[file] = True
@@ -142,11 +142,11 @@ class CampusClient:
     def _make_room(self) -> None:
         budget = self.options.budget
         self._room = np.zeros(len(self.stock.names), dtype=np.bool_)
-        remaining, low = self._filled(self.order.tolist(), self.low, budget)
-        _, high = self._filled(self.near, self.high, remaining)
+        remaining, low = self._fill(self.order.tolist(), self.low, budget)
+        _, high = self._fill(self.near, self.high, remaining)
         self._wanted = [low, high]
 
-    def _filled(
+    def _fill(
         self, objects: Iterable[int], files: list[tuple[int, ...]], remaining: int | None
     ) -> tuple[int | None, deque[int]]:
         """The rest of a budget, None without one, and the objects that fit."""

@@ -147,7 +147,7 @@ def simulate_campus(
     for f in range(frames):
         now = float(world.time[f])
         while finished := link.advance(now):
-            client.arrived(finished)
+            client.receive(finished)
             client.fetch()
             if begun is None and client.begun:
                 begun = link.now
@@ -155,9 +155,9 @@ def simulate_campus(
         client.fetch()
         waits.look(now)
         memory[f] = client.memory
-        fetched[f] = link.bytes + sum(r.received for r in client.waiting)
+        fetched[f] = link.bytes + sum(r.body_bytes for r in client.waiting)
         lacking[f] = waits.lacking if client.order.size else wanted
-        view, (mesh, column) = int(world.view[f]), columns.of(client)
+        view, (mesh, column) = int(world.view[f]), columns.state(client)
         triangles[f] = columns.faces[world.seen[f], mesh[world.seen[f]]].sum()
         if world.tables is not None and view >= 0:
             error[f] = world.tables.wrong(view, mesh, column)
@@ -206,7 +206,7 @@ class _Columns:
             [[stock.diffuse(base, size) for size in SIZES] for base in bases], dtype=np.int64
         ).reshape(-1, len(SIZES))
 
-    def of(self, client: CampusClient) -> tuple[Ints, Ints]:
+    def state(self, client: CampusClient) -> tuple[Ints, Ints]:
         """(m,) of the objects, and (T,) of the textures, as `Tables.wrong` takes them."""
         shown = client.shown
         mesh = np.where(shown[self._coarse], COARSE, NOTHING)

@@ -151,10 +151,10 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
     for name in files:
         data = file_bytes(folder, name, files[name])
         if name in sizes:
-            taken = _TEXEL * _mipped(sizes[name])
+            taken = _TEXEL * _texels_with_mips(sizes[name])
             rows.append((len(data), len(data), taken, taken))
         else:
-            rows.append((on_link(data), len(data), _held(folder, name, data), len(data)))
+            rows.append((on_link(data), len(data), _mesh_bytes(folder, name, data), len(data)))
     sent, stored, memory, largest = np.array(rows, dtype=np.int64).T.copy()
     stock = Stock(
         campus=campus,
@@ -179,7 +179,7 @@ def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -
     """
     data = _bytes(folder, name, LONGEST if listed is None else listed[0])
     if listed is not None and (len(data), zlib.crc32(data)) != listed:
-        raise refused(folder / name, "is not the file that the index of the campus lists")
+        raise stock_error(folder / name, "is not the file that the index of the campus lists")
     return data
 
 
@@ -189,19 +189,19 @@ def _bytes(folder: Path, name: str, limit: int) -> bytes:
         with open_below(folder, name) as stream:
             return stream.read(limit + 1)
     except OSError as fault:
-        raise refused(folder / name, f"cannot be read ({fault.strerror or fault})") from None
+        raise stock_error(folder / name, f"cannot be read ({fault.strerror or fault})") from None
 
 
-def _held(folder: Path, name: str, data: bytes) -> int:
+def _mesh_bytes(folder: Path, name: str, data: bytes) -> int:
     """Bytes of the vertices and indices of a mesh."""
     try:
         chunks = glb_chunks(data)
         return view_bytes(schemas.parse(chunks[0][2]), chunks[1][2])
     except (ValueError, LookupError, TypeError, schemas.ShapeError) as fault:
-        raise refused(folder / name, f"is no mesh of a campus ({fault})") from None
+        raise stock_error(folder / name, f"is no mesh of a campus ({fault})") from None
 
 
-def _mipped(side: int) -> int:
+def _texels_with_mips(side: int) -> int:
     """Texels of a square and of its mip levels."""
     total = 0
     while side:
@@ -226,16 +226,16 @@ def _require_textures(folder: Path, stock: Stock) -> None:
     campus = stock.campus
     for number, item in enumerate(campus.objects):
         if max(item.materials, default=-1) >= len(campus.materials):
-            raise refused(folder / INDEX, f"{item.name} has a material that there is not")
+            raise stock_error(folder / INDEX, f"{item.name} has a material that there is not")
         try:
             stock.low(number)
             for quality in PRESETS:
                 stock.high(number, quality, True)
         except KeyError as fault:
-            raise refused(folder / INDEX, f"does not list {fault.args[0]}") from None
+            raise stock_error(folder / INDEX, f"does not list {fault.args[0]}") from None
 
 
-def refused(file: Path, what: str) -> InputError:
+def stock_error(file: Path, what: str) -> InputError:
     """PTM-I122."""
     return InputError("PTM-I122", what, file=file, remedy=_AGAIN)
 
@@ -255,9 +255,9 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
         try:
             primitives = read_mesh(file_bytes(folder, name))
         except ValueError as fault:
-            raise refused(folder / name, f"is no mesh of a campus ({fault})") from None
+            raise stock_error(folder / name, f"is no mesh of a campus ({fault})") from None
         if max(p.material for p in primitives) >= len(campus.materials):
-            raise refused(folder / name, "has a material that the campus does not have")
+            raise stock_error(folder / name, "has a material that the campus does not have")
         rows += [(number, p) for p in primitives]
     count = [len(p.triangle) for _, p in rows]
     looks = [campus.materials[p.material] for _, p in rows]
@@ -271,7 +271,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
         rows_of = np.array(values, dtype=kind).reshape(len(rows), *shape)
         return np.repeat(rows_of, count, axis=0)
 
-    corner = _joined([p.point[p.triangle] for _, p in rows], 3)
+    corner = _stack_rows([p.point[p.triangle] for _, p in rows], 3)
     lit = campus.lightmaps != "none" and any(len(o.meshes) > 1 for o in campus.objects)
     bright = [_brightness(p, lit and level == 0) for _, p in rows]
     color = np.concatenate([np.zeros((0, 3)), *bright])
@@ -279,7 +279,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
     glass = [m.alpha == "blend" and t < 0 for m, t in zip(looks, texture, strict=True)]
     return Surfaces(
         corner=corner,
-        uv=_joined([_texture_points(p) for _, p in rows], 2),
+        uv=_stack_rows([_texture_points(p) for _, p in rows], 2),
         cell=spread([number for number, _ in rows], np.int32),
         shape=np.repeat(np.arange(len(rows), dtype=np.int32), count),
         texture=spread(texture, np.int32),
@@ -308,9 +308,9 @@ def _image(folder: Path, name: str, size: int) -> NDArray[np.uint8]:
             load(image)
             pixels = np.asarray(image.convert("RGB"))
     except PtmError as fault:
-        raise refused(folder / name, fault.message) from None
+        raise stock_error(folder / name, fault.message) from None
     if pixels.shape[:2] != (size, size):
-        raise refused(folder / name, f"is not a square of {size} texels")
+        raise stock_error(folder / name, f"is not a square of {size} texels")
     return np.ascontiguousarray(pixels)
 
 
@@ -328,5 +328,5 @@ def _texture_points(primitive: Primitive) -> Floats:
     return primitive.uv[primitive.triangle]
 
 
-def _joined(rows: list[Floats], width: int) -> Floats:
+def _stack_rows(rows: list[Floats], width: int) -> Floats:
     return np.concatenate([np.zeros((0, 3, width)), *rows])

@@ -37,7 +37,7 @@ from ptmtools.walk import Walk, read_walk, walk_text
 from ptmtools_lab import figures
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.world import prepare_campus
-from ptmtools_lab.comparing import SimulateOptions, counted, play, require_hints
+from ptmtools_lab.comparing import SimulateOptions, apply_counting, play, require_hints
 from ptmtools_lab.measures import require as require_flip
 from ptmtools_lab.path.making import path_through
 from ptmtools_lab.path.options import PathOptions
@@ -173,7 +173,7 @@ def walk_campus(
         f"{walk.length:.0f} m in {walk.duration:.0f} s, {world.stock.objects:,} objects, "
         f"{options.bandwidth}bit/s, {options.latency}\n"
     )
-    lines = head, *report.table(runs), "", *report.received(runs)
+    lines = head, *report.table(runs), "", *report.received_table(runs)
     console.result(report.document(campus, runs), lines)
 
 
@@ -308,7 +308,7 @@ def simulate(
         forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
         drawing = Drawing(forms=forms, relief=relief)
         worlds = {
-            name: counted(
+            name: apply_counting(
                 prepare(served, walk, pyramids, progress=progress, drawing=drawing), options
             )
             for name, walk in walks.items()

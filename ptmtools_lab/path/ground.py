@@ -113,7 +113,7 @@ class WalkGround:
     cost: Floats
 
     @staticmethod
-    def of(eye: Floats, cell: Ints, space: Floats, steps: Ints, cost: Floats) -> WalkGround:
+    def from_steps(eye: Floats, cell: Ints, space: Floats, steps: Ints, cost: Floats) -> WalkGround:
         """From (k, 2) steps, walkable in both directions, and their (k,) costs."""
         both = np.concatenate([steps, steps[:, ::-1]])
         order = np.lexsort((both[:, 1], both[:, 0]))
@@ -132,9 +132,9 @@ class WalkGround:
         known[known] = standing[self.cell[known]]
         reached = np.unique(np.column_stack([part[known], self.cell[known]]), axis=0)[:, 0]
         cells, places = np.bincount(reached, minlength=parts), np.bincount(part)
-        return self._kept(part == np.lexsort((-places, -cells))[0])
+        return self._keep(part == np.lexsort((-places, -cells))[0])
 
-    def _kept(self, kept: Bools) -> WalkGround:
+    def _keep(self, kept: Bools) -> WalkGround:
         name = np.cumsum(kept) - 1
         source = np.repeat(np.arange(len(self.eye)), np.diff(self.start))
         inside = kept[source] & kept[self.target]
@@ -165,7 +165,7 @@ class WalkObstacles:
         if solid.any():
             self._tree = ray_tree(scene.points[scene.triangles[solid]] - self._middle)
 
-    def crossed(self, start: Floats, end: Floats) -> Bools:
+    def blocks(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether a surface lies between (n, 3) points and (n, 3) others, metres."""
         result: Bools = self.first(start, end - start, 1.0)[0] >= 0
         return result
@@ -210,7 +210,7 @@ def over_floors(cells: Cells, obstacles: WalkObstacles, eye_height: float) -> Wa
     cell = cells.locate(point).astype(np.int64)
     missed = cells.standing
     missed[cell[cell >= 0]] = False
-    floor = cells.eye_floor[_below(cells, missed, eye_height)]
+    floor = cells.eye_floor[_floors_below(cells, missed, eye_height)]
     if len(floor):
         fine, present = _surfaces(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
         within = cells.locate(fine)
@@ -219,12 +219,12 @@ def over_floors(cells: Cells, obstacles: WalkObstacles, eye_height: float) -> Wa
         firm = np.append(firm, present[extra])
     steps = _steps(point, walker, eyes, obstacles)
     space = np.where(firm, _space(point, obstacles, eye_height), 0.0)
-    return WalkGround.of(
+    return WalkGround.from_steps(
         point, cell, space, steps, _cost(point, space, steps, obstacles, walker, eye_height)
     )
 
 
-def _below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
+def _floors_below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
     """(n,) which triangles of floor lie below an eye in a leaf of the (C,) ``missed`` cells."""
     corner = cells.eye_floor + [0, eye_height, 0]
     low, high = corner.min(axis=1), corner.max(axis=1)
@@ -323,7 +323,7 @@ def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: WalkObstac
     steps = steps[np.lexsort((steps[:, 1], steps[:, 0]))]
     start, end = point[steps[:, 0]], point[steps[:, 1]]
     steps = steps[eyes.contains((start + end) / 2)]
-    return steps[~obstacles.crossed(point[steps[:, 0]], point[steps[:, 1]])]
+    return steps[~obstacles.blocks(point[steps[:, 0]], point[steps[:, 1]])]
 
 
 def _space(point: Floats, obstacles: WalkObstacles, eye_height: float) -> Floats:
@@ -354,5 +354,5 @@ def _cost(
     through = np.zeros(len(steps), dtype=np.bool_)
     for height in BODY[:-1]:
         below = [0, (1 - height) * eye_height, 0]
-        through |= obstacles.crossed(start - below, end - below)
+        through |= obstacles.blocks(start - below, end - below)
     return np.asarray((cost + _THROUGH * through) * np.linalg.norm(end - start, axis=1))

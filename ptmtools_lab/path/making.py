@@ -59,10 +59,10 @@ def through_portals(cells: Cells, obstacles: WalkObstacles, eye_height: float) -
     eye = np.concatenate([leaf.reshape(-1, 3), portal.reshape(-1, 3)])
     number = np.arange(cells.portal_count) + cells.leaf_count
     steps = np.concatenate([np.column_stack([cells.portal_leaf[:, i], number]) for i in (0, 1)])
-    steps = steps[~obstacles.crossed(eye[steps[:, 0]], eye[steps[:, 1]])].astype(np.int64)
+    steps = steps[~obstacles.blocks(eye[steps[:, 0]], eye[steps[:, 1]])].astype(np.int64)
     cost = np.linalg.norm(eye[steps[:, 0]] - eye[steps[:, 1]], axis=1)
     cell = np.append(cells.leaf_cell, np.full(cells.portal_count, -1)).astype(np.int64)
-    return WalkGround.of(eye, cell, np.full(len(eye), ABOUT), steps, cost)
+    return WalkGround.from_steps(eye, cell, np.full(len(eye), ABOUT), steps, cost)
 
 
 def _in_leaf(cells: Cells, leaf: int, eye_height: float) -> Floats:
@@ -155,17 +155,19 @@ def make_path(
     looks: list[Floats] = []
     stands, spent = np.zeros(0), 0.0
     for some in tour(ground, middles, views, first):
-        ways, ahead = _smoothed(ground.eye, some, smoother), [leg.looks for leg in some]
+        ways, ahead = _smooth_legs(ground.eye, some, smoother), [leg.looks for leg in some]
         stood = options.stop * random.uniform(*_STANDS, sum(map(len, ahead)))
         legs, looks, stands = legs + ways, looks + ahead, np.append(stands, stood)
-        took = Motion.of(ways, ahead, stood, options.speed).duration  # without turns between rounds
+        took = Motion.from_legs(
+            ways, ahead, stood, options.speed
+        ).duration  # without turns between rounds
         spent += took
         # In a single room without pictures the walker stays in place.
         if options.duration is None or spent >= options.duration or not took:
             break
-    motion = Motion.of(legs, looks, stands, options.speed)
+    motion = Motion.from_legs(legs, looks, stands, options.speed)
     duration = motion.duration if options.duration is None else options.duration
-    walk = _sampled(motion, duration, options, cells, random)
+    walk = _sample_walk(motion, duration, options, cells, random)
     visited = np.unique(cells.locate(walk.eye))
     visited = visited[visited >= 0]
     return Path(
@@ -177,7 +179,7 @@ def make_path(
     )
 
 
-def _smoothed(eye: Floats, legs: list[Leg], smoother: Smoother) -> list[Floats]:
+def _smooth_legs(eye: Floats, legs: list[Leg], smoother: Smoother) -> list[Floats]:
     """(n, 3) points of each leg."""
     points, fixed = [], []
     for leg in legs:
@@ -194,7 +196,7 @@ def _smoothed(eye: Floats, legs: list[Leg], smoother: Smoother) -> list[Floats]:
     return np.split(smooth, np.cumsum(count)[:-1])
 
 
-def _sampled(
+def _sample_walk(
     motion: Motion, duration: float, options: PathOptions, cells: Cells, random: np.random.Generator
 ) -> Walk:
     """The walk, sampled at the rate of the options."""
@@ -202,7 +204,7 @@ def _sampled(
     last = max(int(duration * options.rate), 1)
     times = np.arange(last * substeps + 1) / (substeps * options.rate)
     direction = directions(motion, times, random)[::substeps]
-    along, _ = motion.at(times[::substeps])
+    along, _ = motion.position(times[::substeps])
     eye = motion.way.position(along)
     # Points between two valid points of the way are nearly always valid; else the nearer one is
     # taken.

@@ -53,7 +53,7 @@ class Way:
     high: Floats
 
     @staticmethod
-    def of(legs: Sequence[Floats]) -> Way:
+    def from_legs(legs: Sequence[Floats]) -> Way:
         """From (n, 3) points of each leg, which begins where the one before ends."""
         point = np.concatenate(legs)
         last = np.cumsum([len(leg) for leg in legs]) - 1
@@ -100,10 +100,12 @@ class Motion:
     speed: float
 
     @staticmethod
-    def of(legs: Sequence[Floats], looks: Sequence[Floats], stands: Floats, speed: float) -> Motion:
+    def from_legs(
+        legs: Sequence[Floats], looks: Sequence[Floats], stands: Floats, speed: float
+    ) -> Motion:
         """From legs of (n, 3) points, the (k, 3) directions of view ``looks`` at their ends, one
         after the other, and ``stands``, the seconds of each."""
-        way = Way.of(legs)
+        way = Way.from_legs(legs)
         low, high = way.low, way.high
         number = np.arange(len(legs))
         out, back = way.heading(low, number), way.heading(high, number)
@@ -134,12 +136,12 @@ class Motion:
         """Seconds."""
         return float(self.leave[-1])
 
-    def at(self, times: Floats) -> tuple[Floats, Ints]:
+    def position(self, times: Floats) -> tuple[Floats, Ints]:
         """(n,) metres along the way at (n,) times, seconds, and (n,) the leg."""
         leg = np.maximum(np.searchsorted(self.begin, times, "right") - 1, 0)
         since = np.clip(times, None, self.arrive[leg]) - self.begin[leg]
         length = (self.way.high - self.way.low)[leg]
-        return self.way.low[leg] + _walked(since, length, self.speed), leg
+        return self.way.low[leg] + _walked_length(since, length, self.speed), leg
 
 
 def _walking_time(length: Floats, speed: float) -> Floats:
@@ -149,7 +151,7 @@ def _walking_time(length: Floats, speed: float) -> Floats:
     return np.where(length >= ramp, whole, 2 * np.sqrt(length / ACCELERATION))
 
 
-def _walked(since: Floats, length: Floats, speed: float) -> Floats:
+def _walked_length(since: Floats, length: Floats, speed: float) -> Floats:
     """(n,) metres walked of (n,) metres after (n,) seconds: slower at both ends."""
     time = _walking_time(length, speed)
     top = np.minimum(speed, np.sqrt(length * ACCELERATION))
@@ -184,15 +186,15 @@ def directions(motion: Motion, times: Floats, random: np.random.Generator) -> Fl
     yaw = np.arctan2(aim[:, 2], aim[:, 0]) + _glances(motion, times, random)
     pitch = np.arcsin(np.clip(aim[:, 1], -1.0, 1.0))
     step = float(times[1] - times[0])
-    yaw = _followed(yaw, step, _YAW_RATE, _YAW_GAIN)
-    pitch = _followed(pitch, step, _PITCH_RATE, _PITCH_GAIN)
+    yaw = _follow(yaw, step, _YAW_RATE, _YAW_GAIN)
+    pitch = _follow(pitch, step, _PITCH_RATE, _PITCH_GAIN)
     level = np.cos(pitch)
     return np.column_stack([level * np.cos(yaw), np.sin(pitch), level * np.sin(yaw)])
 
 
 def _aims(motion: Motion, times: Floats) -> Floats:
     """(n, 3) unit vectors to the targets of view, without glances."""
-    along, leg = motion.at(times)
+    along, leg = motion.position(times)
     aim = motion.way.heading(along, leg)
     for number, (looks, until) in enumerate(zip(motion.looks, motion.until, strict=True)):
         arrive, leave = motion.arrive[number], motion.leave[number]
@@ -217,12 +219,12 @@ def _glances(motion: Motion, times: Floats, random: np.random.Generator) -> Floa
     begin = np.cumsum(random.uniform(*_PAUSE, count) + _GLANCING)
     which = np.searchsorted(begin, times, "right") - 1
     glancing = (which >= 0) & (times - begin[which] < _GLANCING)
-    _, leg = motion.at(times)
+    _, leg = motion.position(times)
     glancing &= times < motion.arrive[leg] - _EARLY
     return np.where(glancing, np.where(which % 2 == 0, _GLANCE, -_GLANCE), 0.0)
 
 
-def _followed(aim: Floats, step: float, rate: float, gain: float) -> Floats:
+def _follow(aim: Floats, step: float, rate: float, gain: float) -> Floats:
     """(n,) angles that follow (n,) targets, ``step`` seconds apart, at most at a ``rate`` that
     changes by at most ``gain`` a second, all in radians."""
     result = np.empty(len(aim))
@@ -255,14 +257,14 @@ class Smoother:
         beyond the ends of its (n,) ``leg``, ascending."""
         begin, end = np.searchsorted(leg, leg), np.searchsorted(leg, leg, "right") - 1
         row = np.arange(len(point))
-        hits, parted = self._body_hits(point), self._parted(point)
+        hits, parted = self._body_hits(point), self._gaps(point)
         for reach in _REACHES:
             step = np.minimum(reach, np.minimum(row - begin, end - row))
             target = (point[row - step] + point[row + step]) / 2
             moves = ~fixed & (step > 0)
             while moves.any():
                 candidate = np.where(moves[:, None], target, point)
-                hit, apart = self._body_hits(candidate), self._parted(candidate)
+                hit, apart = self._body_hits(candidate), self._gaps(candidate)
                 bad = (moves & ~self._eyes.contains(candidate)) | (apart & ~parted)
                 bad |= (hit & ~hits).any(axis=1)
                 if not bad.any():
@@ -272,11 +274,11 @@ class Smoother:
                 moves &= np.convolve(bad, np.ones(2 * reach + 1))[reach:-reach] == 0
         return point
 
-    def _parted(self, point: Floats) -> Bools:
+    def _gaps(self, point: Floats) -> Bools:
         """(n,) whether an eye cannot go from a point to the next one."""
         following = np.append(point[1:], point[-1:], axis=0)
         outside = ~self._eyes.contains((point + following) / 2)
-        return outside | self._obstacles.crossed(point, following)
+        return outside | self._obstacles.blocks(point, following)
 
     def _body_hits(self, point: Floats) -> Bools:
         """(n, 2·heights) contacts of the body at each point: by height from shoulder to shoulder,
@@ -288,6 +290,6 @@ class Smoother:
         side *= np.divide(self._radius, length, out=np.zeros(len(point)), where=length > 0)[:, None]
         crossings = []
         for below in self._below:
-            crossings.append(self._obstacles.crossed(point - below - side, point - below + side))
-            crossings.append(self._obstacles.crossed(point - below, point - below + ahead))
+            crossings.append(self._obstacles.blocks(point - below - side, point - below + side))
+            crossings.append(self._obstacles.blocks(point - below, point - below + ahead))
         return np.stack(crossings, axis=1)

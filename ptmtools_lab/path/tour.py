@@ -76,21 +76,23 @@ class StopViews:
         worth, self._box, self._boxes = _worth(scene, obstacles, eye, ray)
         self._worth, self._box = worth.reshape(shape), self._box.reshape(shape)
         self._new = np.ones(self._boxes)
-        self._best = float(self._shown().max(initial=0.0))
+        self._best = float(self._view_worth().max(initial=0.0))
 
     def round(self) -> dict[int, list[WalkStop]]:
         """The stops of one round by cell: at pictures not yet viewed, or, once all were, at all of
         them again."""
-        if self._shown().max(initial=0.0) < _LEAST * self._best:
+        if self._view_worth().max(initial=0.0) < _LEAST * self._best:
             self._new[:] = 1.0
-        return {int(cell): stops for cell in np.unique(self._cell) if (stops := self._in(cell))}
+        return {
+            int(cell): stops for cell in np.unique(self._cell) if (stops := self._stops_in(cell))
+        }
 
-    def _in(self, cell: int) -> list[WalkStop]:
+    def _stops_in(self, cell: int) -> list[WalkStop]:
         rows = np.flatnonzero(self._cell == cell)
         stops: list[WalkStop] = []
         least = _LEAST * self._best
         while len(stops) < _STOPS:
-            shown = self._shown(rows)
+            shown = self._view_worth(rows)
             row, ahead = np.unravel_index(shown.argmax(), shown.shape)
             if shown[row, ahead] <= 0 or shown[row, ahead] < least:
                 break
@@ -114,7 +116,7 @@ class StopViews:
         counted = along[weight > 0]
         return np.asarray(counted[(counted @ middle).argmax()])
 
-    def _shown(self, rows: Ints | slice = slice(None)) -> Floats:
+    def _view_worth(self, rows: Ints | slice = slice(None)) -> Floats:
         """(n, around) worth of views not yet viewed, in bytes."""
         ray = (self._worth[rows] * self._new[self._box[rows]]).sum(axis=2)
         return np.asarray(sum(np.roll(ray, k, axis=1) for k in range(-_BESIDE, _BESIDE + 1)))

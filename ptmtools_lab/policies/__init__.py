@@ -50,7 +50,7 @@ class PolicyEntry:
     previews: bool = False
     options: PaperOptions | None = None
 
-    def configured(self, options: PaperOptions) -> PolicyEntry:
+    def with_options(self, options: PaperOptions) -> PolicyEntry:
         """The policy with other options, if it has any."""
         if self.options is None:
             return self

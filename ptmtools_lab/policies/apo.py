@@ -55,8 +55,8 @@ class ApoClient(EngineClient):
     def settle(self) -> None:
         """See `Client.settle`."""
         self._see()
-        self._target_levels, _ = self._filled(self.wanted)
-        levels, self._all = self._filled(np.minimum(self.wanted, self.have[self.octrees]))
+        self._target_levels, _ = self._fill(self.wanted)
+        levels, self._all = self._fill(np.minimum(self.wanted, self.have[self.octrees]))
         super().settle()
         self.column[self.octrees] = levels
 
@@ -96,7 +96,7 @@ class ApoClient(EngineClient):
         self.wanted = np.where(seen, np.minimum(levels, stock.levels[self.octrees]), self.wanted)
         self._seen[seen] = self.frame
 
-    def _filled(self, limit: Ints) -> tuple[Ints, int]:
+    def _fill(self, limit: Ints) -> tuple[Ints, int]:
         """(O,) levels that fit, at most ``limit``, the coarsest of all first; and the bytes that
         remain."""
         memory = self.world.catalogue.memory[self.octrees]

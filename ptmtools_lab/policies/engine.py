@@ -47,7 +47,7 @@ from ptmtools.site.client import (
     RECORD_SHARE,
     STREAMS,
 )
-from ptmtools_lab.allocation import allocate, gather, holes, offered
+from ptmtools_lab.allocation import allocate, gather, holes, choose_sources
 from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.world import World
@@ -207,7 +207,7 @@ class EngineClient(Client):
             )  # fmt: skip
         return share
 
-    def known(self) -> Ints:
+    def visible_set(self) -> Ints:
         """The visible set of the current cell, itself first."""
         return self.world.catalogue.visible[self.cell]
 
@@ -248,7 +248,7 @@ class EngineClient(Client):
         worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.gains
         step, source = np.zeros(stock.ends.shape), np.zeros(stock.ends.shape, np.int64)
         last = np.zeros(stock.texture_count, np.int64)
-        offered(worth, self.have, stock.previews, self.previews.whole, step, source, last)
+        choose_sources(worth, self.have, stock.previews, self.previews.whole, step, source, last)
         last = np.where(self._suffices(), self.exact, last)
         allocate(step, stock.memory, last, self.budget, self.column, exact)
         while self.world.track.browser and self._grow():
@@ -256,9 +256,9 @@ class EngineClient(Client):
             allocate(step, stock.memory, last, self.budget, self.column, exact)
         self.source = source[np.arange(len(last)), self.column]
 
-    def arrived(self, request: Request) -> None:
-        """See `Client.arrived`."""
-        super().arrived(request)
+    def receive(self, request: Request) -> None:
+        """See `Client.receive`."""
+        super().receive(request)
         if request.tag.kind not in (FileKind.TEXTURE, FileKind.PREVIEW):  # type: ignore[attr-defined]
             if self.cell < 0 and self.records.whole[self.world.track.cell[self.frame]]:
                 self.cell = int(self.world.track.cell[self.frame])
@@ -351,7 +351,7 @@ class EngineClient(Client):
         """The finer mesh of the greatest worth per byte, and that; -1 and 0 if there is none."""
         stock = self.world.catalogue
         meshes, asked = stock.meshes, self.meshes.asked > 0
-        shown = self.geometry.whole & np.isin(np.arange(stock.cell_count), self.known())
+        shown = self.geometry.whole & np.isin(np.arange(stock.cell_count), self.visible_set())
         free = ~asked & shown[meshes.cell]
         if not free.any():
             return -1, 0.0
@@ -400,9 +400,9 @@ class Oracle:
         self._exchanging = exchanging
         self._now, self._cells = _drops(world)
         self._soon = [
-            _discounted(table, SOON * world.track.rate) for table in (self._now, self._cells)
+            _discount(table, SOON * world.track.rate) for table in (self._now, self._cells)
         ]
-        self._later = [_discounted(t, LATER * world.track.rate) for t in (self._now, self._cells)]
+        self._later = [_discount(t, LATER * world.track.rate) for t in (self._now, self._cells)]
 
     def __call__(self, client: EngineClient) -> Worth:
         """See `Policy`."""
@@ -438,7 +438,7 @@ def _drops(world: World) -> tuple[Singles, Singles]:
     return columns[world.track.view], cells[world.track.view]
 
 
-def _discounted(table: Singles, frames: float) -> Singles:
+def _discount(table: Singles, frames: float) -> Singles:
     """Discounted sums over future frames; each frame counts less than the one before."""
     result, kept = np.empty_like(table), np.exp(-1 / frames)
     total = np.zeros_like(table[0])

@@ -252,20 +252,20 @@ class PaperClient(Client):
         self._request(FileKind.GEOMETRY, current, CURRENT)
         if self.cell < 0:
             return
-        for cell in self.known().tolist():
+        for cell in self.visible_set().tolist():
             self._request(FileKind.GEOMETRY, cell, VISIBLE)
         # The paper has no levels of detail: the objects as modelled follow the cells.
-        known = self.known()
-        for mesh in self.modelled(known[self.geometry.whole[known]]):
+        known = self.visible_set()
+        for mesh in self.finest_meshes(known[self.geometry.whole[known]]):
             self._request(FileKind.MESH, mesh, VISIBLE)
         following = self._next()
         if following >= 0:
             self._request(FileKind.RECORD, following, NEXT)
             self._request(FileKind.GEOMETRY, following, NEXT)
 
-    def arrived(self, request: object) -> None:
-        """See `Client.arrived`."""
-        super().arrived(request)  # type: ignore[arg-type]
+    def receive(self, request: object) -> None:
+        """See `Client.receive`."""
+        super().receive(request)  # type: ignore[arg-type]
         part = request.tag  # type: ignore[attr-defined]
         if part.kind == FileKind.TEXTURE:
             self._pending[part.number] = False
@@ -273,7 +273,7 @@ class PaperClient(Client):
     def settle(self) -> None:
         """See `Client.settle`: `tick` does it."""
 
-    def known(self) -> Ints:
+    def visible_set(self) -> Ints:
         """The visible set of the cell in use."""
         return self.world.catalogue.visible[self.cell]
 
@@ -296,7 +296,7 @@ class PaperClient(Client):
         stock = self.world.catalogue
         frustum = self.world.frustum(self.frame)
         loaded = self.geometry.whole
-        known, hint = self.known(), stock.coverage[self.cell]
+        known, hint = self.visible_set(), stock.coverage[self.cell]
         seen = np.array(
             [loaded[c] and (c == self.cell or frustum.meets_hull(self._hulls[c])) for c in known]
         )

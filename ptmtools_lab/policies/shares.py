@@ -42,22 +42,22 @@ def geometry_by_coverage(client: EngineClient) -> Floats:
     """(C,) worth of the geometry of cells: the error of a grey cell times its mean share of the
     view."""
     stock = client.world.catalogue
-    known = client.known()
+    known = client.visible_set()
     ahead = client.frustum.meets_boxes(stock.low[known], stock.high[known])
     share = np.zeros(stock.cell_count)
     share[known] = np.where(ahead, 1.0, BEHIND) * client.coverage()
-    return NOTHING * np.maximum(share, _beyond(client))
+    return NOTHING * np.maximum(share, _weights_beyond(client))
 
 
 def geometry_by_placeholders(client: EngineClient, age: int) -> Floats:
     """(C,) the same by the share of the item buffer, ``age`` frames old, that shows a placeholder
     of each cell; coverage counts hidden cells."""
     share = np.zeros(client.world.catalogue.cell_count)
-    share[client.known()] = BEHIND * client.coverage()
-    return NOTHING * (np.maximum(share, _beyond(client)) + client.placeholders(age))
+    share[client.visible_set()] = BEHIND * client.coverage()
+    return NOTHING * (np.maximum(share, _weights_beyond(client)) + client.placeholders(age))
 
 
-def _beyond(client: EngineClient) -> Floats:
+def _weights_beyond(client: EngineClient) -> Floats:
     """(C,) weights of cells that are seen from neighbours."""
     stock = client.world.catalogue
     share = np.zeros(stock.cell_count)
@@ -135,7 +135,7 @@ def by_box(client: EngineClient, shapes: Ints) -> Floats:
     """The shares of the screen that the boxes of the shapes cover, without occlusion."""
     stock = client.world.catalogue
     covered = client.frustum.covered_shares(stock.shapes.low[shapes], stock.shapes.high[shapes])
-    return _summed(stock, shapes, covered)
+    return _sum_by_texture(stock, shapes, covered)
 
 
 def coverage_shares(client: EngineClient, shapes: Ints) -> Floats:
@@ -158,7 +158,7 @@ def by_texture(client: EngineClient, shapes: Ints) -> Floats:
     """As `coverage_shares`, divided among textures by their shares in the record."""
     stock = client.world.catalogue
     record = stock.records[client.cell]
-    known, coverage = client.known(), client.coverage()
+    known, coverage = client.visible_set(), client.coverage()
     ahead = np.zeros((stock.cell_count, stock.texture_count), dtype=bool)
     ahead[stock.shapes.cell[shapes], stock.shapes.texture[shapes]] = True
     weights = np.zeros(stock.texture_count)
@@ -176,14 +176,14 @@ def by_texture(client: EngineClient, shapes: Ints) -> Floats:
 def _split(client: EngineClient, shapes: Ints, coverage: Floats) -> Floats:
     stock = client.world.catalogue
     of_cell = np.zeros(stock.cell_count)
-    of_cell[client.known()] = coverage
+    of_cell[client.visible_set()] = coverage
     count = np.bincount(stock.shapes.cell[shapes], minlength=stock.cell_count)
     of_cell *= count > 0
     shape_share = of_cell / max(float(of_cell.sum()), 1e-12) / np.maximum(count, 1)
-    return _summed(stock, shapes, shape_share[stock.shapes.cell[shapes]])
+    return _sum_by_texture(stock, shapes, shape_share[stock.shapes.cell[shapes]])
 
 
-def _summed(stock: Catalogue, shapes: Ints, of_shape: Floats) -> Floats:
+def _sum_by_texture(stock: Catalogue, shapes: Ints, of_shape: Floats) -> Floats:
     """(T,) sums over the shapes of each texture."""
     result = np.zeros(stock.texture_count)
     np.add.at(result, stock.shapes.texture[shapes], of_shape)

@@ -60,7 +60,7 @@ class WholeFileClient(Client, ABC):
         if self.cell >= 0:
             for cell in self.world.catalogue.visible[self.cell].tolist():
                 self.request(FileKind.GEOMETRY, cell)
-            for mesh in self.modelled(self.world.catalogue.visible[self.cell]):
+            for mesh in self.finest_meshes(self.world.catalogue.visible[self.cell]):
                 self.request(FileKind.MESH, mesh)
         return True
 
@@ -148,9 +148,9 @@ class WholeClient(WholeFileClient):
                 break
             self.request(FileKind.TEXTURE, t)
 
-    def modelled(self, cells: Ints) -> list[int]:
-        """See `Client.modelled`: after the geometry of their cells."""
-        return super().modelled(cells[self.geometry.whole[cells]])
+    def finest_meshes(self, cells: Ints) -> list[int]:
+        """See `Client.finest_meshes`: after the geometry of their cells."""
+        return super().finest_meshes(cells[self.geometry.whole[cells]])
 
     def _shrink(self, budget: int) -> None:
         """The least recently seen textures leave until the others fit."""
@@ -184,13 +184,13 @@ class GpuiiClient(WholeFileClient):
         """See `Client.look`."""
         self.frame = frame
         self._see()
-        self._steps = self._ordered()
-        self._target = self._filled(self.wanted)[0]
+        self._steps = self._order_steps()
+        self._target = self._fill(self.wanted)[0]
         super().look(frame)
 
     def settle(self) -> None:
         """See `Client.settle`."""
-        self.column, remaining = self._filled(np.minimum(self.wanted, self.have))
+        self.column, remaining = self._fill(np.minimum(self.wanted, self.have))
         self.keep(np.lexsort((self.distance, -self._seen)), remaining)
 
     def fetch(self) -> None:
@@ -222,7 +222,7 @@ class GpuiiClient(WholeFileClient):
         self.wanted = np.where(visible, np.minimum(coarse + 1, stock.levels), 0)
         self._seen[visible] = self.frame
 
-    def _ordered(self) -> list[tuple[int, int]]:
+    def _order_steps(self) -> list[tuple[int, int]]:
         texture = np.repeat(np.arange(len(self.wanted)), self.wanted)
         first = np.cumsum(self.wanted) - self.wanted
         step = np.arange(len(texture)) - first[texture] + 1
@@ -230,7 +230,7 @@ class GpuiiClient(WholeFileClient):
         order = np.lexsort((texture, distance, step, distance // self._ring))
         return list(zip(texture[order].tolist(), step[order].tolist(), strict=True))
 
-    def _filled(self, limit: Ints) -> tuple[Ints, int]:
+    def _fill(self, limit: Ints) -> tuple[Ints, int]:
         """(T,) columns that fit, at most ``limit``, by the order of steps; and the bytes left."""
         memory = self.world.catalogue.memory
         column, remaining = np.zeros_like(limit), self.budget

@@ -130,13 +130,13 @@ class Deadline:
         self._end = time.perf_counter() + 60 * minutes
 
     @property
-    def left(self) -> float:
+    def remaining(self) -> float:
         """Remaining seconds, at least 0."""
         return max(0.0, self._end - time.perf_counter())
 
     def part(self, share: float) -> Deadline:
         """A share of the remaining time."""
-        return Deadline(share * self.left / 60)
+        return Deadline(share * self.remaining / 60)
 
 
 def run(
@@ -150,7 +150,7 @@ def run(
     settings = experiment.settings
     trials: list[Trial] = []
     for i, setting in enumerate(settings):
-        if trials and deadline and not deadline.left:
+        if trials and deadline and not deadline.remaining:
             break
         trials.append(Trial(setting, experiment.measure(setting)))
         progress(i + 1, len(settings), f"trying {stage}")
@@ -206,7 +206,7 @@ def decibels(error: float) -> float:
     return 20 * math.log10(255 / error) if error else math.inf
 
 
-def timed(work: Callable[[], Any]) -> tuple[Any, float]:
+def time_work(work: Callable[[], Any]) -> tuple[Any, float]:
     """The result of ``work``, and the processor seconds of this process for it."""
     start = time.process_time()
     result = work()

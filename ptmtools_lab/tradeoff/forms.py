@@ -35,7 +35,7 @@ from ptmtools_lab.tradeoff.experiment import (
     Setting,
     Subject,
     decibels,
-    timed,
+    time_work,
 )
 from ptmtools_systems.apo.files import encode_stream, glb_of
 from ptmtools_systems.apo.making import distinct, make_apo, weld
@@ -74,7 +74,7 @@ class ViewerRays:
     far: float
 
     @staticmethod
-    def around(points: Floats) -> ViewerRays:
+    def from_points(points: Floats) -> ViewerRays:
         """ViewerRays at the box of (n, 3) points from all sides."""
         low, high = points.min(axis=0), points.max(axis=0)
         middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -133,7 +133,7 @@ def outline(a: Seen, b: Seen) -> float:
     return float((a.met != b.met).sum() / max(int((a.met | b.met).sum()), 1))
 
 
-def apart(a: Seen, b: Seen) -> Floats:
+def distances_between(a: Seen, b: Seen) -> Floats:
     """Distances of two meshes along the rays that meet both."""
     both = a.met & b.met
     return np.asarray(np.abs(a.distance - b.distance)[both])
@@ -158,7 +158,7 @@ def octree_experiment(scene: Scene) -> Experiment:
     """The experiment of the octree texture of all triangles of a scene."""
     points, triangles = weld(scene.points, scene.triangles)
     triangles, _ = distinct(triangles)
-    rays = ViewerRays.around(points[triangles].reshape(-1, 3))
+    rays = ViewerRays.from_points(points[triangles].reshape(-1, 3))
     truth = look(rays, points, triangles)
     normals = corner_normals(points, triangles)
     base = replace(ApoOptions(), faces=max(4, min(ApoOptions.faces, len(triangles) // 4)))
@@ -166,7 +166,7 @@ def octree_experiment(scene: Scene) -> Experiment:
 
     def measure(setting: Setting) -> Measurement:
         options = replace(base, **setting.knobs)
-        made, seconds = timed(lambda: make_apo(scene, options, Executor()))
+        made, seconds = time_work(lambda: make_apo(scene, options, Executor()))
         mesh, octree = made.mesh, made.octree
         seen = look(rays, mesh.points, mesh.triangles)
         both = truth.met & seen.met
@@ -214,7 +214,7 @@ def interlaced_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
 
     def measure(setting: Setting) -> Measurement:
         options = replace(InterlaceOptions(), **setting.knobs)
-        sets, seconds = timed(lambda: [interlace(Picture(image), options) for image in images])
+        sets, seconds = time_work(lambda: [interlace(Picture(image), options) for image in images])
         square, worst = 0.0, 0.0
         for image, written in zip(images, sets, strict=True):
             axes = [part.axis for part in written.interlaced.parts if part.axis is not None]
@@ -257,7 +257,7 @@ def coarse_experiment(scene: Scene, parts: Sequence[ObjectPart]) -> Experiment:
     for part in parts:
         used, index = np.unique(scene.triangles[part.triangles], return_inverse=True)
         meshes.append(Mesh(scene.points[used], index.reshape(-1, 3).astype(np.int32)))
-    rays = [ViewerRays.around(mesh.points) for mesh in meshes]
+    rays = [ViewerRays.from_points(mesh.points) for mesh in meshes]
     truths = [look(ray, m.points, m.triangles) for ray, m in zip(rays, meshes, strict=True)]
 
     def coarse(mesh: Mesh, options: CampusOptions) -> Mesh:
@@ -265,9 +265,9 @@ def coarse_experiment(scene: Scene, parts: Sequence[ObjectPart]) -> Experiment:
 
     def measure(setting: Setting) -> Measurement:
         options = replace(defaults, **setting.knobs)
-        made, seconds = timed(lambda: [coarse(mesh, options) for mesh in meshes])
+        made, seconds = time_work(lambda: [coarse(mesh, options) for mesh in meshes])
         seen = [look(ray, m.points, m.triangles) for ray, m in zip(rays, made, strict=True)]
-        off = [apart(a, b) for a, b in zip(truths, seen, strict=True)]
+        off = [distances_between(a, b) for a, b in zip(truths, seen, strict=True)]
         edges = [outline(a, b) for a, b in zip(truths, seen, strict=True)]
         return Measurement(
             seconds=seconds,
@@ -322,7 +322,7 @@ def light_experiment(
     turn = random.random(len(face))
 
     def measure(setting: Setting) -> Measurement:
-        value, seconds = timed(lambda: lit(setting.knobs["samples"], turn))
+        value, seconds = time_work(lambda: lit(setting.knobs["samples"], turn))
         off = 255 * np.abs(value - truth)
         return Measurement(
             seconds=seconds,
@@ -353,7 +353,7 @@ def jpeg_experiment(images: Sequence[NDArray[np.uint8]]) -> Experiment:
     squares = [square_image(_colors(image), JPEG_SIDE) for image in images]
 
     def measure(setting: Setting) -> Measurement:
-        files, seconds = timed(lambda: [jpeg(s, setting.knobs["quality"]) for s in squares])
+        files, seconds = time_work(lambda: [jpeg(s, setting.knobs["quality"]) for s in squares])
         square = []
         for data, image in zip(files, squares, strict=True):
             with Image.open(io.BytesIO(data)) as opened:

@@ -23,7 +23,7 @@ from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import ACH, CELLS, EMIT, LIGHT, PVS, STAGES, TEXTURES
-from ptmtools_lab.tradeoff.experiment import timed
+from ptmtools_lab.tradeoff.experiment import time_work
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def settings(
                 yield KnobSetting(knob, value, knob.text(current), changed)
 
 
-def concerned(stage: Stage[Any], recorded: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
+def concerned_stages(stage: Stage[Any], recorded: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
     """A stage and those that depend on its result, in their order."""
     result = [stage]
     for later in STAGES.values():
@@ -165,7 +165,7 @@ def own_options(artifacts: Artifacts) -> Own:
 
 
 @contextmanager
-def copied(db: Path) -> Iterator[Path]:
+def temporary_copy(db: Path) -> Iterator[Path]:
     """A temporary copy of a database, to be changed."""
     with TemporaryDirectory(prefix="ptmtools-") as folder:
         yield Path(shutil.copytree(db, Path(folder) / "db"))
@@ -178,12 +178,12 @@ def build_again(db: Path, options: Own) -> Seconds:
     for stage, chosen in options.items():
         run = partial(run_stage, db, chosen, workers=1, rebuild=True)
         _, seconds = compiled_and_timed(run)
-        result[stage.name] = seconds if seconds >= BRIEF else min(seconds, timed(run)[1])
+        result[stage.name] = seconds if seconds >= BRIEF else min(seconds, time_work(run)[1])
     return result
 
 
 def compiled_and_timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """As `timed`, of a second call if the first one compiled kernels."""
+    """As `time_work`, of a second call if the first one compiled kernels."""
     compiled = compilations()
-    result = timed(work)
-    return result if compilations() == compiled else timed(work)
+    result = time_work(work)
+    return result if compilations() == compiled else time_work(work)

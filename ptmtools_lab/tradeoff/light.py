@@ -30,7 +30,7 @@ from ptmtools_lab.tradeoff.experiment import (
     Setting,
     Subject,
     decibels,
-    timed,
+    time_work,
 )
 
 #: Cells that stand for all, and points of each.
@@ -90,9 +90,9 @@ def lightmap_experiment(
         options = replace(recorded, **setting.knobs)
         chosen = [pieces(options.light_density)[cell] for cell in cells]
         with_options = replace(baking, options=options)
-        made, seconds = timed(lambda: [with_options.light(piece) for piece in chosen])
+        made, seconds = time_work(lambda: [with_options.light(piece) for piece in chosen])
         rows = zip(made, chosen, places, strict=True)
-        shown = np.concatenate([_shown(light, piece, *place) for light, piece, place in rows])
+        shown = np.concatenate([_shown_light(light, piece, *place) for light, piece, place in rows])
         off = np.abs(255 * (shown - right))
         error = float(np.sqrt(np.square(off).mean()))
         return Measurement(
@@ -120,7 +120,7 @@ def lightmap_experiment(
     )
 
 
-def _shown(light: CellLight, piece: CellSurfaces, face: Ints, share: Floats) -> Floats:
+def _shown_light(light: CellLight, piece: CellSurfaces, face: Ints, share: Floats) -> Floats:
     """(n,) the light, 0 to 1, that clients show at places of (n,) faces."""
     at_vertices = np.einsum("nk,nk->n", share, light.vertex[face] / 255)
     if light.texels is None:

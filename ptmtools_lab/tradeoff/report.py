@@ -59,7 +59,7 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
         )
         lines.append(f"  cheapest with an error of at most {wanted:g}: {answer}")
     if trade.untried:
-        lines.append(f"  {_untried(trade.untried)}")
+        lines.append(f"  {_untried_text(trade.untried)}")
     return lines
 
 
@@ -68,15 +68,15 @@ def amount(value: float, unit: str) -> str:
     if unit == "B":
         return size(round(value))
     number = f"{value:,.0f}" if float(value).is_integer() else f"{value:.3g}"
-    return _joined(number, unit)
+    return _quantity(number, unit)
 
 
-def _joined(number: str, unit: str) -> str:
+def _quantity(number: str, unit: str) -> str:
     return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
 
 
 def _error(value: float, trade: Trade) -> str:
-    return _joined(f"{value:.4f}", trade.units.get("error", ""))
+    return _quantity(f"{value:.4f}", trade.units.get("error", ""))
 
 
 def as_csv(trades: Sequence[Trade]) -> str:
@@ -165,7 +165,7 @@ def _price(tried: WalkTrial, unchanged: WalkTrial) -> tuple[int, float]:
         return 4, 0.0
     longer = _longer(tried, unchanged) / max(unchanged.build, _BRIEF)
     changes = [_more_bytes(tried, unchanged), longer]
-    if any(_noticed(*pair) for pair in _pairs(tried, unchanged)):
+    if any(_is_noticeable(*pair) for pair in _pairs(tried, unchanged)):
         changes.append(_change(tried, unchanged))
     gains, losses = any(c < 0 for c in changes), any(c > 0 for c in changes)
     rank = (1 if losses else 0) if gains else (3 if losses else 2)
@@ -180,9 +180,9 @@ def representative(some: Sequence[WalkTrial], unchanged: WalkTrial) -> WalkTrial
     if not valid:
         return some[0]
     least = min(valid, key=lambda tried: _change(tried, unchanged))
-    if any(_noticed(*pair) for pair in _pairs(least, unchanged)):
+    if any(_is_noticeable(*pair) for pair in _pairs(least, unchanged)):
         return least
-    alike = [t for t in valid if not any(_noticed(*pair) for pair in _pairs(t, unchanged))]
+    alike = [t for t in valid if not any(_is_noticeable(*pair) for pair in _pairs(t, unchanged))]
     return min(alike, key=lambda tried: (tried.served, tried.build))
 
 
@@ -191,14 +191,14 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
     if tried.problem:
         return f"{tried.name} cannot be tested: {tried.problem}."
     unchanged = trade.own
-    saved = _saved(tried, unchanged)
+    saved = _saving_text(tried, unchanged)
     pairs = _pairs(tried, unchanged)
     cases = [seen.case for _, seen in pairs]
-    noticed = [pair for pair in pairs if _noticed(*pair)]
+    noticed = [pair for pair in pairs if _is_noticeable(*pair)]
     changes = []
     for way, some in groupby(noticed, lambda pair: "worse" if pair[1].e > pair[0].e else "better"):
         parts = [
-            f"{_by(was, now)}{_where(now.case, cases)} (e {was.e:.2f} → {now.e:.2f})"
+            f"{_change_text(was, now)}{_where(now.case, cases)} (e {was.e:.2f} → {now.e:.2f})"
             for was, now in some
         ]
         changes.append(f"{way} {_and(parts)}")
@@ -213,7 +213,7 @@ def sentence(tried: WalkTrial, trade: WalkTrade) -> str:
     return f"{tried.name} instead of {tried.own} {saved}; {seen}."
 
 
-def _saved(tried: WalkTrial, unchanged: WalkTrial) -> str:
+def _saving_text(tried: WalkTrial, unchanged: WalkTrial) -> str:
     parts = []
     if more := _more_bytes(tried, unchanged):
         parts.append(
@@ -245,7 +245,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:,.{0 if share >= 0.0995 else 1}f} %"
 
 
-def _by(was: WalkOutcome, now: WalkOutcome) -> str:
+def _change_text(was: WalkOutcome, now: WalkOutcome) -> str:
     return f"by {_percent(abs(now.e / was.e - 1))} " if was.e else ""
 
 
@@ -260,7 +260,7 @@ def _where(case: Case, cases: Sequence[Case]) -> str:
 
 def _pairs(tried: WalkTrial, unchanged: WalkTrial) -> list[tuple[WalkOutcome, WalkOutcome]]:
     """The outcomes of the database's own options and of the setting, case by case."""
-    return [(was, now) for now in tried.seen if (was := unchanged.by(now.case))]
+    return [(was, now) for now in tried.seen if (was := unchanged.outcome(now.case))]
 
 
 def _change(tried: WalkTrial, unchanged: WalkTrial) -> float:
@@ -269,7 +269,7 @@ def _change(tried: WalkTrial, unchanged: WalkTrial) -> float:
     return sum((now.e - was.e) / max(was.e, _STEPS) for was, now in pairs) / max(len(pairs), 1)
 
 
-def _noticed(was: WalkOutcome, now: WalkOutcome) -> bool:
+def _is_noticeable(was: WalkOutcome, now: WalkOutcome) -> bool:
     return abs(now.e - was.e) >= max(_SHARE * was.e, _STEPS)
 
 
@@ -295,18 +295,18 @@ def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
             name = cheapest.setting.name if cheapest else "none of these"
             lines.append(f"  cheapest with an error of at most {wanted:g}: {name}")
     if trade.untried:
-        lines += ["", _untried(trade.untried)]
+        lines += ["", _untried_text(trade.untried)]
     return lines
 
 
-def _untried(names: Sequence[str]) -> str:
+def _untried_text(names: Sequence[str]) -> str:
     return f"Not tested within the time limit (--minutes): {', '.join(names)}."
 
 
 def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:
-    was = trade.own.by(case)
+    was = trade.own.outcome(case)
     for tried in (trade.own, *trade.trials):
-        seen = tried.by(case)
+        seen = tried.outcome(case)
         if not seen or not was:
             continue
         change = f"{(seen.e - was.e) / was.e:+.1%}" if seen is not was and was.e else "–"
@@ -327,7 +327,7 @@ def _trade(trade: WalkTrade, case: Case) -> Trade:
     where = f"{policy}, {rate_text(bandwidth)}, texture memory {memory}"
     trials = []
     for tried in (trade.own, *trade.trials):
-        if seen := tried.by(case):
+        if seen := tried.outcome(case):
             more = {"fetched": float(seen.fetched)}
             if seen.first is not None:
                 more["first"] = seen.first

@@ -60,7 +60,7 @@ from ptmtools_lab.tradeoff.experiment import (
     Setting,
     Subject,
     decibels,
-    timed,
+    time_work,
 )
 from ptmtools_lab.world import World, prepare
 
@@ -75,7 +75,7 @@ def prepare_cells(subject: Subject) -> Experiment:
     compute_pvs(few, PvsOptions(method="fast"))  # compiles both
 
     def measure(setting: Setting) -> Measurement:
-        cells, seconds = timed(lambda: subdivide(scene, replace(recorded, **setting.knobs)))
+        cells, seconds = time_work(lambda: subdivide(scene, replace(recorded, **setting.knobs)))
         mean, worst = compute_pvs(cells, PvsOptions(method="fast")).volume_at_hand
         return Measurement(
             seconds=seconds,
@@ -224,11 +224,11 @@ class CoverageTrade:
             return HintSampler(self._scene, self._cells, self._pvs, options, backend)
 
         ready().renderer.close()  # loading once is no part of the cost
-        sampler, before = timed(ready)
+        sampler, before = time_work(ready)
         try:
             if asked:
                 sampler.of_cell(asked[0])
-            hints_of, seconds = timed(lambda: {cell: sampler.of_cell(cell) for cell in asked})
+            hints_of, seconds = time_work(lambda: {cell: sampler.of_cell(cell) for cell in asked})
             seconds *= self._cells.cell_count / max(len(asked), 1)
             return hints_of, before + seconds, backend.name
         finally:
@@ -264,7 +264,7 @@ def textures_experiment(images: Sequence[SourceImage], recorded: EncodeOptions) 
 
     def measure(setting: Setting) -> Measurement:
         options = replace(recorded, **setting.knobs)
-        files, seconds = timed(lambda: [encode(pixels, options) for pixels in corners])
+        files, seconds = time_work(lambda: [encode(pixels, options) for pixels in corners])
         pairs = list(zip(files, corners, strict=True))
         square = np.array([_square_error(_at_prefix(*pair), pair[1]) for pair in pairs])
         size = np.array([pixels.size for pixels in corners])
@@ -336,7 +336,7 @@ def visibility_experiment(cells: Cells, budget: int) -> Experiment:
     compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # compiles it
 
     def measure(setting: Setting) -> Measurement:
-        pvs, seconds = timed(lambda: compute_pvs(cells, replace(_BASE, **setting.knobs)))
+        pvs, seconds = time_work(lambda: compute_pvs(cells, replace(_BASE, **setting.knobs)))
         seen = pvs.to_matrix()
         missing, wrong = truth & ~seen, truth != seen
         size = max(int(truth.sum()), 1)
@@ -383,7 +383,7 @@ def client_experiment(world: World) -> Experiment:
 
     def measure(setting: Setting) -> Measurement:
         paper = PaperOptions(**setting.knobs)
-        (played,), seconds = timed(lambda: play({"": world}, options, paper=paper))
+        (played,), seconds = time_work(lambda: play({"": world}, options, paper=paper))
         measures = played.measures
         return Measurement(
             seconds=seconds,

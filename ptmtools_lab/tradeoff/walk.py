@@ -30,23 +30,23 @@ from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.walk import Walk
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
-from ptmtools_lab.comparing import SimulateOptions, budget_of, counted, play, require_hints
+from ptmtools_lab.comparing import SimulateOptions, apply_counting, budget_of, play, require_hints
 from ptmtools_lab.forms import PTM
 from ptmtools_lab.measures import SHARES
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.report import rate_text
-from ptmtools_lab.tables import Drawing, limited
-from ptmtools_lab.tradeoff.experiment import Deadline, timed
+from ptmtools_lab.tables import Drawing, limit_levels
+from ptmtools_lab.tradeoff.experiment import Deadline, time_work
 from ptmtools_lab.tradeoff.knobs import (
     BRIEF,
     KnobSetting,
     Own,
     build_again,
     compiled_and_timed,
-    concerned,
-    copied,
+    concerned_stages,
     own_options,
     settings,
+    temporary_copy,
 )
 from ptmtools_lab.world import World, prepare
 
@@ -178,7 +178,7 @@ class WalkTrial:
     seen: tuple[WalkOutcome, ...] = ()
     problem: str = ""
 
-    def by(self, case: Case) -> WalkOutcome | None:
+    def outcome(self, case: Case) -> WalkOutcome | None:
         """The outcome of a case."""
         return next((seen for seen in self.seen if seen.case == case), None)
 
@@ -253,14 +253,18 @@ def try_settings(
     trials = _Trials(db, recorded, _Walker(walk, original, options), policies)
     number, total = count(len(chosen), "setting"), sum(map(trials.estimate, chosen))
     where = " and ".join(rate_text(link.bandwidth) for link in options.links())
-    limit = "" if total < deadline.left else f", of which {minutes(deadline.left)} are allowed"
+    limit = (
+        ""
+        if total < deadline.remaining
+        else f", of which {minutes(deadline.remaining)} are allowed"
+    )
     tell(
         f"{number} on a walk of {walk.duration:.0f} s at {where} with {options.memory} of texture "
         f"memory; about {minutes(total)}{limit}"
     )
     tried: dict[int, WalkTrial] = {}
     for done, k in enumerate(by_turns(chosen)):
-        if not tried or trials.estimate(chosen[k]) <= deadline.left:
+        if not tried or trials.estimate(chosen[k]) <= deadline.remaining:
             tried[k] = trials.try_setting(chosen[k])
         progress(done + 1, len(chosen), "trying settings")
     untried = tuple(setting.name for k, setting in enumerate(chosen) if k not in tried)
@@ -306,10 +310,12 @@ class _Trials:
 
     def __init__(self, db: Path, recorded: Own, walker: _Walker, policies: Sequence[str]) -> None:
         self._db, self._own, self._walker = db, recorded, walker
-        with copied(db) as copy:
+        with temporary_copy(db) as copy:
             self._seconds = build_again(copy, recorded)
             served, begin = read_served(copy), time.perf_counter()
-            world, drawing = timed(lambda: compared(served, walker.walk, walker.original))
+            world, drawing = time_work(
+                lambda: comparison_world(served, walker.walk, walker.original)
+            )
             drawn = time.perf_counter()
         outcomes, walking = compiled_and_timed(
             lambda: tuple(o for policy in policies for o in walker.walks(world, policy))
@@ -325,7 +331,7 @@ class _Trials:
         return fmean(self._slowness) * self._seconds_of(setting)
 
     def _seconds_of(self, setting: KnobSetting) -> float:
-        stages = (self._seconds[s.name] for s in concerned(setting.knob.stage, self._own))
+        stages = (self._seconds[s.name] for s in concerned_stages(setting.knob.stage, self._own))
         return sum(s if s >= BRIEF else 2 * s for s in stages) + self._walking
 
     def try_setting(self, setting: KnobSetting) -> WalkTrial:
@@ -333,10 +339,12 @@ class _Trials:
         stage, words = setting.knob.stage, (setting.name, setting.own, setting.knob.option)
         begin = time.perf_counter()
         try:
-            with copied(self._db) as copy:
+            with temporary_copy(self._db) as copy:
                 options = {**self._own, stage: setting.options}
-                took = build_again(copy, {s: options[s] for s in concerned(stage, options)})
-                world = compared(read_served(copy), self._walker.walk, self._walker.original)
+                took = build_again(copy, {s: options[s] for s in concerned_stages(stage, options)})
+                world = comparison_world(
+                    read_served(copy), self._walker.walk, self._walker.original
+                )
                 outcomes = tuple(self._walker.walks(world, setting.knob.policy))
         except PtmError as fault:
             return WalkTrial(*words, 0, 0, problem=fault.message)
@@ -350,7 +358,7 @@ class _Walker:
 
     def __init__(self, walk: Walk, original: World, options: WalkOptions) -> None:
         self.walk, self.original, self._options = walk, original, options
-        stock = counted(original, options)
+        stock = apply_counting(original, options)
         # The same bytes for all databases.
         self._memory = {
             str(max(budget_of(stock, m), 1)): m.text for m in dict.fromkeys(options.memories)
@@ -373,11 +381,11 @@ class _Walker:
                 result.measures.bytes,
                 result.measures.final[SHARES.index(FIRST)],
             )
-            for result in play({"": counted(world, options)}, options)
+            for result in play({"": apply_counting(world, options)}, options)
         ]
 
 
-def compared(served: Served, walk: Walk, original: World) -> World:
+def comparison_world(served: Served, walk: Walk, original: World) -> World:
     """The world of a walk through a database, with the textures of ``original`` as the reference, a
     world of the same model and walk.
 
@@ -397,7 +405,7 @@ def compared(served: Served, walk: Walk, original: World) -> World:
         world,
         pyramids=levels,
         catalogue=catalogue_of(served, levels.differences, levels.mean),
-        views=limited(world.views, levels.levels),
+        views=limit_levels(world.views, levels.levels),
     )
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,10 @@ from ptmtools_systems.campus.model import (
     CampusMaterial,
     CampusObject,
     Names,
+    RecordFile,
+    TextureFile,
 )
-from ptmtools_systems.campus.objects import notes_on, parts_of
+from ptmtools_systems.campus.objects import ObjectPart, notes_on, parts_of
 from ptmtools_systems.campus.options import CampusOptions
 from ptmtools_systems.campus.records import files_of, read_places, read_records
 from ptmtools_systems.campus.second_set import model_light, model_masks
@@ -89,7 +91,7 @@ def make_campus(
     OutputError: PTM-O001, O002, O003, O010 of the folder.
     MissingComponentError: PTM-M100 lightmaps are to be baked, and xatlas is not installed.
     """
-    executor, path = executor or Executor(), Path(model)
+    executor = executor or Executor()
     FORM.check(folder, force=force)
     if options.lightmaps != "none":
         component("xatlas", "PTM-M100", "lightmaps need xatlas", "campus")
@@ -99,22 +101,62 @@ def make_campus(
         since.append(time.perf_counter())
         seconds[phase] = since[-1] - since[-2]
 
-    scene = ingest(path, reading, progress, workers=executor.workers)
+    given = _read_model(Path(model), options, reading, records, executor.workers, progress)
+    end("reading")
+    with FORM.stage_files(folder, force=force) as put:
+        limits = reading.limit << 20, options.quality
+        textures = _write_textures(put, given.bases, limits, executor, progress)
+        end("textures")
+        made = _write_objects(put, given, textures, executor, progress)
+        end("objects")
+        space, materials = given.scene.space, given.source.materials
+        drawn = options.lods, options.lightmaps, made.objects, materials, tuple(textures)
+        campus = Campus(space.origin, space.metres, space.up, *drawn)
+        put(INDEX, index_bytes(campus))
+    end("writing")
+    notes = *given.notes, *made.notes
+    return Made(campus, given.scene, notes, seconds, made.covered, made.computed)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What the files of a campus are made from: the objects by their names in files, the record of
+    each that has one, and its icon and rank."""
+
+    scene: Scene
+    source: ObjectSource
+    bases: list[BaseImage]
+    tasks: list[tuple[str, ObjectPart]]
+    records: Mapping[str, tuple[RecordFile, bytes]]
+    places: Mapping[str, Mapping[str, Any]]
+    notes: tuple[str, ...]
+
+
+def _read_model(
+    path: Path,
+    options: CampusOptions,
+    reading: IngestOptions,
+    records: str | os.PathLike[str] | None,
+    workers: int,
+    progress: Progress,
+) -> _Given:
+    scene = ingest(path, reading, progress, workers=workers)
     masks, mask_notes = model_masks(path, scene, reading)
     painted = model_light(path, reading) if options.lightmaps == "model" else None
     parts = parts_of(scene, options.small)
-    notes = [*mask_notes, *notes_on(parts)]
+    notes = *mask_notes, *notes_on(parts)
     names = Names()
     bases, of_image = _bases(scene, masks, names)
     materials, material = _materials(scene, of_image, bases)
     tasks = [(names.take(part.label, "object"), part) for part in parts]
-    rows = {}
+    pages: dict[str, bytes] = {}
     places: dict[str, dict[str, Any]] = {}
     if records is not None:
-        pages, more = read_records(records, [(name, part.label) for name, part in tasks])
-        places, strange = read_places(records, [(name, part.label) for name, part in tasks])
-        rows, notes = files_of(pages), [*notes, *more, *strange]
-    work = ObjectSource(
+        labels = [(name, part.label) for name, part in tasks]
+        pages, page_notes = read_records(records, labels)
+        places, place_notes = read_places(records, labels)
+        notes = *notes, *page_notes, *place_notes
+    source = ObjectSource(
         scene.points,
         scene.triangles,
         scene.uv,
@@ -126,46 +168,59 @@ def make_campus(
         options,
         painted,
     )
-    end("reading")
-    with FORM.stage_files(folder, force=force) as put:
-        textures = []
-        limits = reading.limit << 20, options.quality
-        for done, written in enumerate(executor.each(texture_files, limits, bases)):
-            progress(done, len(bases), "textures")
-            for record, data in written:
-                put(record.file, data)
-                textures.append(record)
-        end("textures")
-        objects: list[CampusObject] = []
-        covered = computed = 0
-        for done, made in enumerate(executor.each(make_object, work, tasks)):
-            progress(done, len(tasks), "objects")
-            for file, data in made.meshes:
-                put(file, data)
-            for record, data in made.lightmaps:
-                put(record.file, data)
-                textures.append(record)
-            row, page = rows.get(made.record.name, (None, b""))
-            if row is not None:
-                put(row.file, page)
-            objects.append(replace(made.record, record=row, **places.get(made.record.name, {})))
-            notes += made.notes
-            covered, computed = covered + made.covered, computed + made.computed
-        progress(len(tasks), len(tasks), "objects")
-        end("objects")
-        campus = Campus(
-            scene.space.origin,
-            scene.space.metres,
-            scene.space.up,
-            options.lods,
-            options.lightmaps,
-            tuple(objects),
-            materials,
-            tuple(textures),
-        )
-        put(INDEX, index_bytes(campus))
-    end("writing")
-    return Made(campus, scene, tuple(notes), seconds, covered, computed)
+    return _Given(scene, source, bases, tasks, files_of(pages), places, notes)
+
+
+def _write_textures(
+    put: Callable[[str, bytes], None],
+    bases: list[BaseImage],
+    limits: tuple[int, int],
+    executor: Executor,
+    progress: Progress,
+) -> list[TextureFile]:
+    textures = []
+    for done, written in enumerate(executor.each(texture_files, limits, bases)):
+        progress(done, len(bases), "textures")
+        for record, data in written:
+            put(record.file, data)
+            textures.append(record)
+    return textures
+
+
+class _Objects(NamedTuple):
+    """The objects as written, with notes and sums of `ObjectMade`."""
+
+    objects: tuple[CampusObject, ...]
+    notes: list[str]
+    covered: int
+    computed: int
+
+
+def _write_objects(
+    put: Callable[[str, bytes], None],
+    given: _Given,
+    textures: list[TextureFile],
+    executor: Executor,
+    progress: Progress,
+) -> _Objects:
+    """Writes the objects, and adds their lightmaps to the textures."""
+    objects, covered, computed = [], 0, 0
+    notes: list[str] = []
+    for done, made in enumerate(executor.each(make_object, given.source, given.tasks)):
+        progress(done, len(given.tasks), "objects")
+        for file, data in made.meshes:
+            put(file, data)
+        for record, data in made.lightmaps:
+            put(record.file, data)
+            textures.append(record)
+        row, page = given.records.get(made.record.name, (None, b""))
+        if row is not None:
+            put(row.file, page)
+        objects.append(replace(made.record, record=row, **given.places.get(made.record.name, {})))
+        notes += made.notes
+        covered, computed = covered + made.covered, computed + made.computed
+    progress(len(given.tasks), len(given.tasks), "objects")
+    return _Objects(tuple(objects), notes, covered, computed)
 
 
 def index_bytes(campus: Campus) -> bytes:

@@ -10,7 +10,9 @@ instead of 2.75 with the preset Medium and no lightmaps: bars and sills make a f
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,43 +117,10 @@ def make_object(work: ObjectSource, task: tuple[str, ObjectPart]) -> ObjectMade:
     lods = levels(mesh, options.lods, options.ratio, options.faces, options.error)
     corner = [level.mesh.points[level.mesh.triangles] for level in lods]
     finest = corner[-1]
-    lit, side = options.lightmaps != "none", np.ones(len(faces))
-    lightmaps, notes = [], []
-    covered = computed = 0
-    if lit:
-        atlas = unwrap(mesh.points, mesh.triangles, LIGHT_SIZES)
-        if work.painted is None:  # a painted face has its light on both sides
-            reach = options.reach
-            side = open_sides(work.around, finest, work.two_sided[faces], reach)
-        look = _look(work, faces, finest, lods[-1], side)
-        maps = bake(look, finest, atlas, look.grain, LIGHT_SIZES)
-        source = _light_source(work, faces)
-        texels = [(len(m.value), encode_srgb(m.value.astype(np.float64)), source) for m in maps]
-        lightmaps = light_files(name, texels, options.quality)
-        covered, computed = sum(m.covered for m in maps), sum(m.computed for m in maps)
-        if atlas.side != LIGHT_SIZES[0]:
-            least = (
-                "any lightmap" if atlas.side is None else f"a lightmap of less than {atlas.side}"
-            )
-            notes.append(
-                f"{part.label}: too many charts for {least}; neighbours run into each other"
-            )
-    files, records = [], []
-    for lod, (level, points) in enumerate(zip(lods, corner, strict=True)):
-        material, uv, colors = level.mesh.material, level.mesh.uv, level.mesh.colors
-        assert material is not None
-        assert uv is not None
-        fine = lod == options.lods - 1
-        color = None if colors is None else to_linear(colors / 255)
-        if lit and not fine:
-            look = _look(work, faces, finest, level, side)
-            light = vertex_light(look, points, normals(points))[..., None]
-            color = light * (np.ones(3) if color is None else color)
-        corners = Corners(points, material, uv, atlas.uv if lit and fine else None, color)
-        data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)
-        files.append((file, data))
-        record = MeshFile(file, len(points), len(data), zlib.crc32(data), _short(level.error))
-        records.append(record)
+    light = None
+    if options.lightmaps != "none":
+        light = _bake_light(work, name, part, mesh, lods[-1])
+    files, records = _mesh_files(work, name, faces, lods, light)
     box = _box(corner)
     return ObjectMade(
         CampusObject(
@@ -162,15 +131,79 @@ def make_object(work: ObjectSource, task: tuple[str, ObjectPart]) -> ObjectMade:
             barycentre=_barycentre(finest, box),
             viewpoint=viewpoint(work.around, finest, box),
             materials=tuple(np.unique(work.material[faces]).tolist()),
-            lightmap=name if lit else None,
+            lightmap=name if light else None,
             meshes=tuple(records),
         ),
         tuple(files),
-        tuple(lightmaps),
-        tuple(notes),
-        covered,
-        computed,
+        light.lightmaps if light else (),
+        light.notes if light else (),
+        light.covered if light else 0,
+        light.computed if light else 0,
     )
+
+
+class _BakedLight(NamedTuple):
+    """The light of an object: (T, 3, 2) coordinates in its lightmaps, (T,) lit sides of its faces,
+    and the fields of `ObjectMade`."""
+
+    uv: Floats
+    side: Floats
+    lightmaps: tuple[Written, ...]
+    notes: tuple[str, ...]
+    covered: int
+    computed: int
+
+
+def _bake_light(
+    work: ObjectSource, name: str, part: ObjectPart, mesh: Mesh, level: Simplified
+) -> _BakedLight:
+    """Bakes the lightmaps of an object; ``level`` is its finest one."""
+    faces, finest = part.triangles, level.mesh.points[level.mesh.triangles]
+    side = np.ones(len(faces))
+    atlas = unwrap(mesh.points, mesh.triangles, LIGHT_SIZES)
+    if work.painted is None:  # a painted face has its light on both sides
+        side = open_sides(work.around, finest, work.two_sided[faces], work.options.reach)
+    look = _look(work, faces, finest, level, side)
+    maps = bake(look, finest, atlas, look.grain, LIGHT_SIZES)
+    source = _light_source(work, faces)
+    texels = [(len(m.value), encode_srgb(m.value.astype(np.float64)), source) for m in maps]
+    lightmaps = light_files(name, texels, work.options.quality)
+    notes = []
+    if atlas.side != LIGHT_SIZES[0]:
+        least = "any lightmap" if atlas.side is None else f"a lightmap of less than {atlas.side}"
+        notes.append(f"{part.label}: too many charts for {least}; neighbours run into each other")
+    covered, computed = sum(m.covered for m in maps), sum(m.computed for m in maps)
+    return _BakedLight(atlas.uv, side, tuple(lightmaps), tuple(notes), covered, computed)
+
+
+def _mesh_files(
+    work: ObjectSource,
+    name: str,
+    faces: Ints,
+    lods: Sequence[Simplified],
+    light: _BakedLight | None,
+) -> tuple[list[tuple[str, bytes]], list[MeshFile]]:
+    """The files of the levels, and their records; the finest level has the lightmaps, others have
+    light at their vertices."""
+    files, records = [], []
+    finest = lods[-1].mesh.points[lods[-1].mesh.triangles]
+    for lod, level in enumerate(lods):
+        points = level.mesh.points[level.mesh.triangles]
+        material, uv, colors = level.mesh.material, level.mesh.uv, level.mesh.colors
+        assert material is not None
+        assert uv is not None
+        fine = lod == len(lods) - 1
+        color = None if colors is None else to_linear(colors / 255)
+        if light and not fine:
+            look = _look(work, faces, finest, level, light.side)
+            brightness = vertex_light(look, points, normals(points))[..., None]
+            color = brightness * (np.ones(3) if color is None else color)
+        corners = Corners(points, material, uv, light.uv if light and fine else None, color)
+        data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)
+        files.append((file, data))
+        record = MeshFile(file, len(points), len(data), zlib.crc32(data), _short(level.error))
+        records.append(record)
+    return files, records
 
 
 def _look(

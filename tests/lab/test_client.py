@@ -33,7 +33,7 @@ def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
             under_way.append(part)
         elif act == "arrive" and under_way:
             part = under_way.pop(number % len(under_way))
-            files.arrived(part)
+            files.receive(part)
             held[part.begin : part.end] = True
         assert files.loaded[1] == (200 if held.all() else held.argmin())
         assert files.whole.tolist() == [False, held.all()]
@@ -48,9 +48,9 @@ def test_the_last_byte_counts() -> None:
     client = LruClient(standing(stock, 1), FluidLink(Conditions()), 1 << 40)
     for kind, files in client.files.items():
         for number, size in enumerate(files.size.tolist()):
-            files.arrived(files.ask(number, size - 1))
+            files.receive(files.ask(number, size - 1))
             assert not files.whole[number]
-            files.arrived(files.ask(number, size))
+            files.receive(files.ask(number, size))
             assert files.whole[number], kind
     for t, texture in enumerate(textures):
         client.textures.loaded[t] = 0

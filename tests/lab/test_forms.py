@@ -19,7 +19,7 @@ from ptmtools.rendering.kernels import GREY
 from ptmtools.rendering.pyramids import mip_levels, mip_sizes, read_pyramids
 from ptmtools.rendering.records import Shows, own_levels
 from ptmtools.texture import decode
-from ptmtools_lab.comparing import SimulateOptions, budget_of, counted, play
+from ptmtools_lab.comparing import SimulateOptions, apply_counting, budget_of, play
 from ptmtools_lab.forms import PTM
 from ptmtools_lab.measures import Flip
 from ptmtools_lab.policies import POLICIES
@@ -162,7 +162,7 @@ def test_what_can_be_fetched_of_interlaced_images(interlaced_world: World) -> No
     own = interlaced_world.catalogue
     assert (stock.record_bytes == own.record_bytes).all()
     assert stock.shapes is own.shapes
-    papers = counted(interlaced_world, SimulateOptions(paper_bytes=True))
+    papers = apply_counting(interlaced_world, SimulateOptions(paper_bytes=True))
     for form in (PTM, *interlaced_world.other_forms):
         whole = interlaced_world.in_form(form).catalogue.whole
         assert papers.in_form(form).catalogue.whole == pytest.approx(whole * 3 / 4)

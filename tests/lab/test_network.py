@@ -42,7 +42,7 @@ def test_every_byte_is_accounted_for(conditions: Conditions, acts: list[Act]) ->
         assert before <= link.now
         assert link.busy <= link.now + 1e-9
         before = link.now
-    assert close(sum(r.received for r in client.asked), link.bytes)
+    assert close(sum(r.body_bytes for r in client.asked), link.bytes)
 
 
 @given(CONDITIONS, ACTS)
@@ -54,7 +54,7 @@ def test_requests_come_whole_and_not_too_early(conditions: Conditions, acts: lis
         assert r.sent is not None
         assert r.first_byte is not None
         assert r.ended is not None
-        assert r.received == r.size
+        assert r.body_bytes == r.size
         assert r.issued <= r.sent
         assert r.sent + conditions.latency <= r.first_byte + 1e-9
         seconds = (r.size + conditions.overhead) * 8 / conditions.bandwidth
@@ -81,8 +81,8 @@ def test_what_has_arrived_stays(conditions: Conditions, acts: list[Act]) -> None
     held: dict[Request, float] = {}
     for _ in client.play(acts):
         for r in client.asked:
-            assert held.get(r, 0) <= r.received <= r.size
-            held[r] = r.received
+            assert held.get(r, 0) <= r.body_bytes <= r.size
+            held[r] = r.body_bytes
     assert link.advance(link.now + 1e3) is None
     assert link.partial == 0
 
@@ -91,7 +91,7 @@ def played(conditions: Conditions, acts: list[Act]) -> list[Any]:
     client = run(conditions, acts)
     link = client.link
     return [
-        [(r.tag, r.sent, r.first_byte, r.ended, r.received) for r in client.asked],
+        [(r.tag, r.sent, r.first_byte, r.ended, r.body_bytes) for r in client.asked],
         [r.tag for r in client.finished],
         (link.now, link.busy, link.carried, link.bytes, link.overhead_bytes),
     ]
@@ -210,15 +210,15 @@ def test_h2_serves_the_highest_priority() -> None:
     link = FluidLink(Conditions(MEGABIT, 0.1, 0, "h2"))
     low, high = link.request(12_500, 1.0), link.request(12_500, 2.0)
     assert link.advance(0.15) is None
-    assert (low.received, high.received) == (0, pytest.approx(6_250))
+    assert (low.body_bytes, high.body_bytes) == (0, pytest.approx(6_250))
     urgent = link.request(1250, 3.0)
     assert link.advance(1.0) is high
     assert link.now == pytest.approx(0.2)
     assert link.advance(0.25) is None
-    assert urgent.received == 0  # It begins at .25, and takes the link from the low one.
+    assert urgent.body_bytes == 0  # It begins at .25, and takes the link from the low one.
     assert link.advance(1.0) is urgent
     assert link.now == pytest.approx(0.26)
-    assert low.received == pytest.approx(6_250)
+    assert low.body_bytes == pytest.approx(6_250)
     assert link.advance(1.0) is low
     assert link.now == pytest.approx(0.31)
     assert low.first_byte == pytest.approx(0.2)
@@ -262,7 +262,7 @@ def test_a_trace_by_hand() -> None:
     request = link.request(18_750, 1.0)
     assert link.advance(2.5) is None
     assert request.first_byte == 1.0
-    assert request.received == pytest.approx(12_500)
+    assert request.body_bytes == pytest.approx(12_500)
     assert link.advance(3.25) is None
     late = link.request(0, 1.0)
     assert late.starts == pytest.approx(3.25 + 0.1 + 0.4)

@@ -54,7 +54,7 @@ def played(
         clients.append(Watched(made, link, budget, options or PaperOptions()))
         return clients[0]
 
-    policy = replace(PAPER.configured(options or PaperOptions()), client=make)
+    policy = replace(PAPER.with_options(options or PaperOptions()), client=make)
     run = simulate(made, policy, conditions, budget)
     return run, cast("Watched", clients[0])
 
@@ -162,7 +162,7 @@ def test_a_level_at_a_time() -> None:
 @pytest.mark.parametrize("seconds", [0.01, 0.2, 3.0, 10.0])
 def test_patience(seconds: float) -> None:
     stock = catalogue([LARGE], [(0, 0)])
-    patient = PAPER.configured(PaperOptions(seconds, seconds))
+    patient = PAPER.with_options(PaperOptions(seconds, seconds))
     levels = sum(8 * size / 512e3 <= seconds for size in LARGE.groups)
     for made in (strolling(stock, 60), standing(stock, 60)):
         assert simulate(made, patient, bare(512e3), 4 * MIB).quality[-1] == levels / 11
@@ -344,7 +344,7 @@ def test_the_cell_comes_before_what_it_sees_and_that_before_levels() -> None:
     client = Watched(made, link, 1000)
     while client.cell < 0:
         while done := link.advance(link.now + 0.1):
-            client.arrived(done)
+            client.receive(done)
         client.look(0)
         client.fetch()
     client.look(int(np.argmax(made.track.cell == 2)))

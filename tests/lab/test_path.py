@@ -389,7 +389,7 @@ def random_ground(seed: int, count: int = 60) -> tuple[WalkGround, Floats]:
     matrix[steps[:, 0], steps[:, 1]] = matrix[steps[:, 1], steps[:, 0]] = cost
     np.fill_diagonal(matrix, 0)
     cell = np.arange(count) % 7
-    return WalkGround.of(np.zeros((count, 3)), cell, np.ones(count), steps, cost), matrix
+    return WalkGround.from_steps(np.zeros((count, 3)), cell, np.ones(count), steps, cost), matrix
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -416,7 +416,7 @@ def test_the_main_part() -> None:
     eye = np.arange(15.0).reshape(5, 3)
     steps = np.array([[0, 2], [2, 4], [1, 3]])
     cell = np.array([0, 1, 0, 2, 0])
-    ground = WalkGround.of(eye, cell, np.ones(5), steps, np.array([1.0, 2.0, 3.0]))
+    ground = WalkGround.from_steps(eye, cell, np.ones(5), steps, np.array([1.0, 2.0, 3.0]))
     main = ground.main_part(np.array([True, True, True]))
     np.testing.assert_array_equal(main.eye, eye[[1, 3]])
     np.testing.assert_array_equal(main.target, [1, 0])

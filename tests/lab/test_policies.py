@@ -14,7 +14,7 @@ from ptmtools_lab.policies import POLICIES, named_policies
 
 #: What the entry points of the tests name.
 OWN = replace(POLICIES["distance"], name="mine", about="nearest first, by another package")
-TAKEN = POLICIES["paper"].configured(POLICIES["paper"].options)  # type: ignore[arg-type]
+TAKEN = POLICIES["paper"].with_options(POLICIES["paper"].options)  # type: ignore[arg-type]
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ from ptmtools.site.choice import Previews, next_fetch, previews_of
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools.texture import decode, encode, read_header
 from ptmtools.walk import read_walk
-from ptmtools_lab.allocation import offered
+from ptmtools_lab.allocation import choose_sources
 from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink
@@ -122,7 +122,7 @@ def test_sources_of_columns(seed: int) -> None:
     have = case.random.integers(0, case.stored + 1)
     step, source = np.zeros((count, wide)), np.zeros((count, wide), np.int64)
     last = np.zeros(count, np.int64)
-    offered(case.worth, have, case.previews, case.present, step, source, last)
+    choose_sources(case.worth, have, case.previews, case.present, step, source, last)
     for t in range(count):
         mine = [p for p in case.of(t) if case.present[p]]
         assert last[t] == max([have[t], *case.previews.column[mine]])

@@ -269,7 +269,7 @@ def seen_from(world: World, eye: tuple[float, ...], at: tuple[float, ...]) -> Wo
         track = w.track.looking(slice(1))
         return replace(w, track=replace(track, eye=place, direction=direction[None], cell=cell))
 
-    return world.changed(change)
+    return world.change_all(change)
 
 
 def levels_asked(world: World, asked: list[Range]) -> dict[str, int]:
@@ -306,7 +306,7 @@ def test_the_transmission_pauses_where_nodes_are_pixels(world: World) -> None:
     there."""
     foot = STATUES["statue_01"][0]
     eye, middle = (3.6, 1.0, 2.6), (foot[0], 0.6, foot[2])
-    coarse = world.changed(lambda w: replace(w, camera=replace(w.camera, lines=40)))
+    coarse = world.change_all(lambda w: replace(w, camera=replace(w.camera, lines=40)))
     _, asked = walked(seen_from(coarse, eye, middle), 1 << 30)
     relief = world.relief
     assert relief

@@ -111,10 +111,10 @@ def test_what_no_client_may_do(policy: str, seed: int, conditions: Conditions, b
     assert run.overruns == 0
     # The link.
     link = seen.link
-    arriving = sum(r.received for r in seen.asked if r.ended is None)
+    arriving = sum(r.body_bytes for r in seen.asked if r.ended is None)
     known = run.body - arriving + run.overhead
     assert math.isclose(link.carried, known + link.partial, abs_tol=1e-6)
-    assert math.isclose(run.body, sum(r.received for r in seen.asked))
+    assert math.isclose(run.body, sum(r.body_bytes for r in seen.asked))
     assert run.requests == len(seen.requests)
     assert (np.diff(run.fetched) >= 0).all()
     assert run.fetched[-1] == run.body

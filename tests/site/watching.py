@@ -48,7 +48,7 @@ class Witness:
         """The one that is watched."""
         client = POLICIES[self.policy].client(world, link, budget)
         client.ticks = 1
-        look, fetch, arrived = client.look, client.fetch, client.arrived
+        look, fetch, arrived = client.look, client.fetch, client.receive
         #: Of all requests but that for the index, the next number.
         number: dict[Request, int] = {}
 
@@ -86,7 +86,7 @@ class Witness:
                 seen = {} if part.kind in (FileKind.TEXTURE, FileKind.PREVIEW) else _seen(client)
                 self._note("arrived", client.have.tolist(), number=number[request], **seen)
 
-        vars(client).update(look=looked, fetch=fetched, arrived=came)
+        vars(client).update(look=looked, fetch=fetched, receive=came)
         return client
 
     def _note(self, act: str, answer: Any, **told: Any) -> None:
@@ -136,7 +136,7 @@ def _missing(client: Client) -> int | None:
     count = int(not client.records.whole[here])
     if client.cell < 0 or client._worth is None:
         return count
-    known = client.known()
+    known = client.visible_set()
     seen = client.frustum.meets_boxes(stock.low[known], stock.high[known])
     seen |= (known == here) | (client.placeholders(1)[known] > 0)
     count += int((seen & ~client.geometry.whole[known]).sum())

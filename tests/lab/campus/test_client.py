@@ -72,7 +72,7 @@ class Walker:
                 return
             until = min(end, self.link.now + 0.2)
             while finished := self.link.advance(until):
-                self.client.arrived(finished)
+                self.client.receive(finished)
                 self.client.fetch()
 
     def memory_of(self, names: list[str]) -> int:

@@ -22,9 +22,9 @@ from ptmtools_lab.tradeoff import FURTHER
 from ptmtools_lab.tradeoff.experiment import Experiment, Measurement, Setting, decibels
 from ptmtools_lab.tradeoff.forms import (
     ViewerRays,
-    apart,
     coarse_experiment,
     corners_of,
+    distances_between,
     interlaced_experiment,
     jpeg_experiment,
     light_experiment,
@@ -77,7 +77,7 @@ def measured(experiment: Experiment, *names: str) -> Mapping[str, Measurement]:
 def test_rays_meet_what_is_there() -> None:
     cube = np.array([[x, y, z] for x in (0, 2) for y in (0, 2) for z in (0, 2)], np.float64)
     square = np.array([[0, 1, 3], [0, 3, 2]], np.int32)  # x = 0
-    rays = ViewerRays.around(cube)
+    rays = ViewerRays.from_points(cube)
     seen = look(rays, cube, square)
     place = (rays.start + seen.distance[:, None] * rays.along)[seen.met]
     assert np.abs(place[:, 0]).max() < 1e-5
@@ -85,7 +85,7 @@ def test_rays_meet_what_is_there() -> None:
     assert np.allclose(np.einsum("nk,nkx->nx", seen.weight[seen.met], corner), place, atol=1e-5)
     moved = look(rays, cube + [0.1, 0, 0], square)
     ahead = rays.along[seen.met & moved.met, 0]
-    assert np.allclose(apart(seen, moved) * np.abs(ahead), 0.1, atol=1e-5)
+    assert np.allclose(distances_between(seen, moved) * np.abs(ahead), 0.1, atol=1e-5)
     assert outline(seen, seen) == 0
     assert outline(seen, look(rays, cube + [9, 0, 0], square)) > 0.9
 

@@ -32,10 +32,10 @@ from ptmtools_lab.tradeoff.knobs import (
     KNOBS,
     KnobSetting,
     build_again,
-    concerned,
-    copied,
+    concerned_stages,
     own_options,
     settings,
+    temporary_copy,
 )
 from ptmtools_lab.tradeoff.report import (
     representative,
@@ -51,7 +51,7 @@ from ptmtools_lab.tradeoff.walk import (
     WalkTrial,
     begins_with,
     by_turns,
-    compared,
+    comparison_world,
     needs_of,
     require_prices,
     try_settings,
@@ -89,7 +89,7 @@ def built(db: Path, **changed):
     """What is served of a copy with other options of its textures."""
     own = own_options(Artifacts(open_database(db)))
     options = {**own, TEXTURES: replace(own[TEXTURES], **changed)}
-    build_again(db, {stage: options[stage] for stage in concerned(TEXTURES, options)})
+    build_again(db, {stage: options[stage] for stage in concerned_stages(TEXTURES, options)})
     return read_served(db)
 
 
@@ -201,14 +201,19 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
     assert (small.own, small.options.profile) == ("--profile fast", "small")
     quick = list(settings(own, 1024, quick=True))
     assert len({each.knob.option for each in quick}) == len(quick) <= len(KNOBS)
-    assert [s.name for s in concerned(TEXTURES, own)] == ["textures", "relief", "light", "emit"]
+    assert [s.name for s in concerned_stages(TEXTURES, own)] == [
+        "textures",
+        "relief",
+        "light",
+        "emit",
+    ]
 
 
 def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, original) -> None:
     """Looking again, with the coarse textures on the walls, gives the same."""
-    with copied(db) as copy:
+    with temporary_copy(db) as copy:
         coarse = built(copy, max_side=16, preview=0)
-        world = compared(coarse, walk, original)
+        world = comparison_world(coarse, walk, original)
         own = read_pyramids(coarse)
     assert begins_with(original.pyramids, own)
     assert not begins_with(own, original.pyramids)
@@ -238,8 +243,8 @@ def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, 
 
 
 def test_texels_that_differ_are_an_error_even_when_all_is_there(db, walk, original) -> None:
-    with copied(db) as copy:
-        world = compared(built(copy, max_error=8), walk, original)
+    with temporary_copy(db) as copy:
+        world = comparison_world(built(copy, max_error=8), walk, original)
     assert not begins_with(original.pyramids, world.pyramids)
     rows = np.flatnonzero(world.views.texture >= 0)
     last = world.pyramids.levels[world.views.texture[rows]] + 1
@@ -252,17 +257,17 @@ def test_texels_that_differ_are_an_error_even_when_all_is_there(db, walk, origin
 
 
 def test_the_same_database_shows_the_same(db, walk, original) -> None:
-    world = compared(read_served(db), walk, original)
+    world = comparison_world(read_served(db), walk, original)
     np.testing.assert_array_equal(world.views.error, original.views.error)
     np.testing.assert_array_equal(world.views.sight, original.views.sight)
 
 
 def test_other_previews_have_other_errors_and_the_same_reference(db, walk, original) -> None:
     assert len(original.lossy.state) > 0
-    with copied(db) as copy:
-        worse = compared(built(copy, preview=10), walk, original)
-    with copied(db) as copy:
-        lossy = compared(built(copy, exact="never"), walk, original)
+    with temporary_copy(db) as copy:
+        worse = comparison_world(built(copy, preview=10), walk, original)
+    with temporary_copy(db) as copy:
+        lossy = comparison_world(built(copy, exact="never"), walk, original)
     known = original.pyramids.levels[original.views.texture] + 2
     exact = (np.arange(original.views.error.shape[1]) < known[:, None]) & (
         original.views.texture >= 0
@@ -278,7 +283,7 @@ def test_other_previews_have_other_errors_and_the_same_reference(db, walk, origi
 
 def test_a_stage_runs_again_where_it_is_current(db) -> None:
     own = own_options(Artifacts(open_database(db)))
-    with copied(db) as copy:
+    with temporary_copy(db) as copy:
         before = files_below(copy / "www")
         assert list(build_again(copy, own)) == [stage.name for stage in own]
         assert files_below(copy / "www") == before
@@ -296,7 +301,7 @@ def test_all_later_stages_are_built_again(two_rooms) -> None:
     chosen = list(settings(own, 64))
     assert {setting.knob for setting in chosen} == {*KNOBS}
     for setting in chosen:
-        again = concerned(setting.knob.stage, own)
+        again = concerned_stages(setting.knob.stage, own)
         for stage, options in own.items():
             if stage not in again:
                 assert not {*stage.sources(options), *stage.heeds} & {*again}
@@ -392,7 +397,7 @@ def test_what_the_time_does_not_allow_is_named(two_rooms, walk_file) -> None:
 def test_seconds_do_not_include_the_compiler(db, monkeypatch) -> None:
     compiled, seconds = iter([0, 3, 3, 3]), iter([50.0, 2.0, 0.5, 0.4])
     monkeypatch.setattr("ptmtools_lab.tradeoff.knobs.compilations", lambda: next(compiled))
-    monkeypatch.setattr("ptmtools_lab.tradeoff.knobs.timed", lambda run: (None, next(seconds)))
+    monkeypatch.setattr("ptmtools_lab.tradeoff.knobs.time_work", lambda run: (None, next(seconds)))
     both = {EMIT: EmitOptions(), TEXTURES: None}
     assert build_again(db, both) == {"emit": 2.0, "textures": 0.4}
 
@@ -400,7 +405,7 @@ def test_seconds_do_not_include_the_compiler(db, monkeypatch) -> None:
 def test_a_policy_without_its_hints_is_refused_before_anything_is_built(
     db, walk_file, tmp_path, capsys, monkeypatch
 ) -> None:
-    with copied(db) as copy:
+    with temporary_copy(db) as copy:
         own = own_options(Artifacts(open_database(copy)))
         build_again(copy, {EMIT: replace(own[EMIT], need=0)})
         monkeypatch.setattr("ptmtools_lab.tradeoff.walk.build_again", pytest.fail)
