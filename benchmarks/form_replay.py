@@ -51,7 +51,7 @@ from ptmtools.walk import Walk, parse_walk, read_walk  # noqa: E402
 from ptmtools_lab.campus.options import CampusWalkOptions  # noqa: E402
 from ptmtools_lab.campus.simulation import simulate_campus  # noqa: E402
 from ptmtools_lab.campus.stock import Stock  # noqa: E402
-from ptmtools_lab.campus.world import prepare_campus  # noqa: E402
+from ptmtools_lab.campus.world import CampusFrames, prepare_campus  # noqa: E402
 from ptmtools_lab.network import FluidLink  # noqa: E402
 from ptmtools_lab.policies import POLICIES  # noqa: E402
 from ptmtools_lab.simulation import simulate  # noqa: E402
@@ -241,7 +241,7 @@ def campus(folder: Path, site: Site, walk: Walk, seconds: float) -> Scene:
     """A walk through a campus."""
 
     def simulated(visit: Visit, link: Conditions) -> Traffic:
-        place = prepare_campus(folder, since_index(visit), every=0)
+        place = prepare_campus(folder, since_index(visit), frames=CampusFrames(every=0))
         place = replace(place, stock=without_masks(place.stock))
         run = simulate_campus(place, PRESET, CampusWalkOptions(), conditions=link)
         return traffic(run.requests, run.time, run.fetched)

@@ -95,12 +95,8 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
     texture = np.arange(stock.texture_count)
     clock = _Clock(client, link)
     for f in range(frames):
-        for tick in range(1, client.ticks if f else 0):
-            part = tick / client.ticks
-            clock.advance_to(
-                float((1 - part) * world.track.time[f - 1] + part * world.track.time[f])
-            )
-            client.tick()
+        if f:
+            clock.run_ticks(*world.track.time[f - 1 : f + 1].tolist())
         clock.frame(f)
         column[f], loaded[f] = client.column, client.geometry.whole
         state[f] = np.where(client.column > 0, before_first[client.source] + client.column, 0)
@@ -114,12 +110,6 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         arriving = sum(request.body_bytes for request in client.waiting)
         fetched[f] = link.bytes - clock.page_bytes + arriving
         client.fetch()
-    resident, offset = stock.memory[texture, column], state - column
-    grown = np.maximum(np.diff(resident, axis=0, prepend=0), 0)
-    replaced = (np.diff(offset, axis=0, prepend=offset[:1]) != 0) & (column > 0)
-    exact, previews = np.split(shown[:, 1:], [stock.texture_count])
-    textures = int((np.diff(stock.ends, axis=1) * exact).sum())
-    textures += int(stock.previews.bytes[previews.any(axis=1)].sum())
     return WalkRun(
         policy=policy.name,
         conditions=conditions,
@@ -138,15 +128,32 @@ def simulate(world: World, policy: PolicyEntry, conditions: Conditions, budget: 
         body=float(fetched[-1]),
         overhead=link.overhead_bytes,
         documents=sum(int(client.files[kind].loaded.sum()) for kind in DOCUMENTS),
-        useful=textures
-        + float(stock.geometry_bytes[drawn].sum())
-        + float(stock.meshes.bytes[client.meshes.whole & drawn[stock.meshes.cell]].sum()),
-        uploads=int(np.where(replaced, resident, grown).sum()),
+        useful=_useful_bytes(client, shown, drawn),
+        uploads=_upload_bytes(stock.memory[texture, column], column, state - column),
         switches=int(np.count_nonzero(np.diff(state, axis=0, prepend=0))),
         requests=link.requests - clock.page,
         stalls=int((~loaded[np.arange(frames), world.track.cell]).sum()),
         overruns=int((memory > policy.limits(world, budget)).sum()),
     )
+
+
+def _useful_bytes(client: Client, shown: Bools, drawn: Bools) -> float:
+    """Bytes of files, or of their parts, that a frame showed; ``shown`` as `picture` fills it."""
+    stock = client.world.catalogue
+    exact, previews = np.split(shown[:, 1:], [stock.texture_count])
+    textures = int((np.diff(stock.ends, axis=1) * exact).sum())
+    textures += int(stock.previews.bytes[previews.any(axis=1)].sum())
+    meshes = client.meshes.whole & drawn[stock.meshes.cell]
+    geometry = float(stock.geometry_bytes[drawn].sum())
+    return textures + geometry + float(stock.meshes.bytes[meshes].sum())
+
+
+def _upload_bytes(resident: Ints, column: Ints, offset: Ints) -> int:
+    """Bytes sent to graphics memory, from the (F, T) resident bytes of textures, their columns, and
+    the distances of their states from these: what grew, or all where the source changed."""
+    grown = np.maximum(np.diff(resident, axis=0, prepend=0), 0)
+    replaced = (np.diff(offset, axis=0, prepend=offset[:1]) != 0) & (column > 0)
+    return int(np.where(replaced, resident, grown).sum())
 
 
 class _Clock:
@@ -166,6 +173,13 @@ class _Clock:
         self._begun, self._news, self._looked = False, False, -math.inf
         self._late: deque[tuple[float, Request]] = deque()
         self.page = self.page_bytes = 0
+
+    def run_ticks(self, start: float, end: float) -> None:
+        """Advances time to each of the client's instants between two frames."""
+        for tick in range(1, self._client.ticks):
+            part = tick / self._client.ticks
+            self.advance_to((1 - part) * start + part * end)
+            self._client.tick()
 
     def advance_to(self, moment: float) -> None:
         """Advances time; the client handles arrivals."""

@@ -208,18 +208,24 @@ def prepare(
         opening=() if browser else opening_of(served, catalogue, eye, direction),
         relief=relief,
     )
+    world = _with_forms(world, forms, form_views)
+    return _with_octrees(world, catalogue, relief) if relief else world
+
+
+def _with_forms(world: World, forms: Mapping[str, Shows], views: list[WalkViews]) -> World:
+    """The world with the ``forms`` of its textures, each with its views."""
+    stock = world.catalogue
     other_forms = {
         name: replace(
             world,
             form=name,
-            catalogue=world.catalogue.in_columns(FORMS[name].columns(served, False)),
+            catalogue=stock.in_columns(FORMS[name].columns(world.served, False)),
             views=views_in_form,
             shows=shows,
         )
-        for (name, shows), views_in_form in zip(forms.items(), form_views, strict=True)
+        for (name, shows), views_in_form in zip(forms.items(), views, strict=True)
     }
-    world = replace(world, other_forms=other_forms)
-    return _with_octrees(world, catalogue, relief) if relief else world
+    return replace(world, other_forms=other_forms)
 
 
 def _with_octrees(world: World, catalogue: Catalogue, relief: Relief) -> World:

@@ -265,16 +265,31 @@ class CampusWorld:
         )
 
 
+@dataclass(frozen=True)
+class CampusFrames:
+    """The frames of a walk through a campus, and its objects.
+
+    Attributes
+    ----------
+    rate: frames a second. pixels: of the pictures, across and down.
+    every: tabulate the errors of each frame whose number it divides, which takes most of the time;
+        0: of none.
+    only: names of the objects to keep, with * and ?.
+    """
+
+    rate: float = RATE
+    pixels: tuple[int, int] = PIXELS
+    every: int = 1
+    only: str = "*"
+
+
 def prepare_campus(
     folder: str | os.PathLike[str],
     walk: Walk,
     served: Served | None = None,
     pyramids: Pyramids | None = None,
     *,
-    rate: float = RATE,
-    pixels: tuple[int, int] = PIXELS,
-    every: int = 1,
-    only: str = "*",
+    frames: CampusFrames = CampusFrames(),
     progress: Progress = silent,
 ) -> CampusWorld:
     """The world of a walk through a campus.
@@ -285,10 +300,6 @@ def prepare_campus(
         reference is the campus with all finest meshes and largest textures: the loss by compression
         and smaller images is then not an error.
     pyramids: its textures, if they have been read already.
-    rate: frames a second. pixels: of the pictures, across and down.
-    every: tabulate the errors of each frame whose number it divides, which takes most of the time;
-        0: of none.
-    only: names of the objects to keep, with * and ?.
 
     Raises
     ------
@@ -297,7 +308,7 @@ def prepare_campus(
     LimitError: PTM-L400 the walk is too long; PTM-L204 the index is.
     DatabaseError, LimitError: those of `read_pyramids`.
     """
-    time = frame_times(walk, rate)
+    time = frame_times(walk, frames.rate)
     if walk.browser:
         raise InputError(
             "PTM-I701",
@@ -305,20 +316,20 @@ def prepare_campus(
             remedy="use a walk of `ptm path`",
         )
     folder = Path(folder)
-    stock = read_stock(folder, only)
+    stock = read_stock(folder, frames.only)
     eye, direction = walk.at(time)
     view, tables = np.full(len(time), -1, np.int64), None
-    if every:
-        pose = np.concatenate([eye, direction], axis=1)[::every]
+    if frames.every:
+        pose = np.concatenate([eye, direction], axis=1)[:: frames.every]
         seen, inverse = np.unique(pose, axis=0, return_inverse=True)
-        view[::every] = inverse.reshape(-1)
+        view[:: frames.every] = inverse.reshape(-1)
         finest, coarsest = (read_surfaces(folder, stock, level) for level in (-1, 0))
         small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
         full = FullPicture(finest, large)
         if served is not None:
             textures = read_pyramids(served, progress) if pyramids is None else pyramids
             full = FullPicture(served.surfaces, textures)
-        camera = RayCamera(*pixels, walk.field_of_view, walk.aspect)
+        camera = RayCamera(*frames.pixels, walk.field_of_view, walk.aspect)
         sizes = small, middle, large
         tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)
     low, high = stock.boxes[:, :3], stock.boxes[:, 3:]
@@ -326,4 +337,4 @@ def prepare_campus(
         Frustum(at, ahead, walk.field_of_view, walk.aspect).meets_boxes(low, high)
         for at, ahead in zip(eye, direction, strict=True)
     ]
-    return CampusWorld(stock, tables, view, time, eye, np.array(seen_at), rate)
+    return CampusWorld(stock, tables, view, time, eye, np.array(seen_at), frames.rate)

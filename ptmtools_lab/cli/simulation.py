@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -30,21 +32,24 @@ from ptmtools.output.names import HINTS
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
+from ptmtools.progress import Progress
 from ptmtools.quantities import count
 from ptmtools.rendering.light import with_lamp
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.walk import Walk, read_walk, walk_text
 from ptmtools_lab import figures
 from ptmtools_lab.campus.options import CampusWalkOptions
-from ptmtools_lab.campus.world import prepare_campus
-from ptmtools_lab.comparing import SimulateOptions, apply_counting, play, require_hints
+from ptmtools_lab.campus.world import CampusFrames, CampusWorld, prepare_campus
+from ptmtools_lab.comparing import RunResult, SimulateOptions, apply_counting, play, require_hints
 from ptmtools_lab.measures import require as require_flip
 from ptmtools_lab.path.making import path_through
 from ptmtools_lab.path.options import PathOptions
 from ptmtools_lab.policies.paper import PaperOptions
 from ptmtools_lab.report import as_csv, document, table
 from ptmtools_lab.tables import Drawing
-from ptmtools_lab.world import prepare, read_forms, relief_of
+from ptmtools_lab.world import World, prepare, read_forms, relief_of
+
+T = TypeVar("T")
 
 #: Rooms that are listed without ``-v``.
 SHOWN = 12
@@ -141,8 +146,6 @@ def walk_campus(
     campus: str,
     walk_file: str,
     db: str | None,
-    every: int,
-    only: str,
     trace_file: str | None,
     plot_file: str | None,
     force: bool,
@@ -165,7 +168,9 @@ def walk_campus(
     trace = read_trace(trace_file) if trace_file else None
     served = read_served(db) if db else None
     with console.progress() as progress:
-        world = prepare_campus(campus, walk, served, every=every, only=only, progress=progress)
+        world = prepare_campus(
+            campus, walk, served, frames=pick(CampusFrames, values), progress=progress
+        )
     runs = [simulate_campus(world, quality, options, trace) for quality in options.qualities]
     if plot_file is not None:
         write_bytes(plot_file, report.picture(runs, report.form_of(plot_file)), force=force)
@@ -252,17 +257,8 @@ def simulate(
     db: str,
     walk_file: tuple[str, ...],
     seeds: tuple[int, ...],
-    against: str | None,
-    campus: str | None,
     trace_file: str | None,
     flip: bool,
-    csv_file: str | None,
-    plot_file: str | None,
-    measure: str,
-    frames_file: str | None,
-    every: float,
-    strip_file: str | None,
-    force: bool,
     **values: Any,
 ) -> None:
     """Simulate visitors who walk through DB and clients that load it over a modelled link, and
@@ -272,66 +268,118 @@ def simulate(
     change DB.
     """
     options, paper = take(SimulateOptions, values), take(PaperOptions, values)
+    others, output = pick(OtherForms, values), pick(SimulateOutput, values)
     with_paper = any(policy.options for policy in options.policies)
     if paper != PaperOptions() and not with_paper:
         raise click.UsageError(f"{arguments([paper])[0]} needs --policy paper")
     if walk_file and seeds:
         raise click.UsageError("use either --walk or --seed")
-    files = [file for file in (csv_file, plot_file, strip_file) if file]
-    for file in files:
-        check_writable(file, force=force)
-    if len({Path(file).resolve() for file in files}) < len(files):
-        raise click.UsageError("two pictures or tables have the same file name")
-    frames_to = Path(frames_file) if frames_file else None
-    if frames_to:
-        _check_folder(frames_to, force)
-    if plot_file:
-        figures.require()
+    output.check()
     if flip:
         require_flip()
-    _check_campus(options, campus, drawn=bool(frames_to or strip_file))
+    _check_campus(options, others.campus, drawn=bool(output.frames_file or output.strip_file))
     trace = read_trace(trace_file) if trace_file else None
     walks = {file: read_walk(file) for file in walk_file} or _new_walks(db, seeds)
-    served, compared = read_served(db), read_served(against) if against else None
+    with console.progress() as progress:
+        worlds, campuses = _prepare_worlds(db, walks, options, others, progress)
+        played = play(worlds, options, trace, progress, flip=flip, campuses=campuses, paper=paper)
+    output.write(worlds, played, paper)
+    paper_options = paper if with_paper else None
+    lines = table(played, worlds, lit=options.lit, against=others.against, campuses=campuses)
+    if given := arguments([paper]):
+        lines.insert(0, f"policy paper with {' '.join(given)}")
+    result = document(
+        db, played, worlds, lit=options.lit, against=others.against, paper=paper_options
+    )
+    console.result(result, lines)
+
+
+@dataclass(frozen=True)
+class OtherForms:
+    """Another database and a campus of the same model, if the command line names them."""
+
+    against: str | None
+    campus: str | None
+
+
+@dataclass(frozen=True)
+class SimulateOutput:
+    """The files to write beside the report, and the options of `simulate` on them."""
+
+    csv_file: str | None
+    plot_file: str | None
+    measure: str
+    frames_file: str | None
+    every: float
+    strip_file: str | None
+    force: bool
+
+    def check(self) -> None:
+        """Raises, before anything is simulated, what writing would raise."""
+        files = [file for file in (self.csv_file, self.plot_file, self.strip_file) if file]
+        for file in files:
+            check_writable(file, force=self.force)
+        if len({Path(file).resolve() for file in files}) < len(files):
+            raise click.UsageError("two pictures or tables have the same file name")
+        if self.frames_file:
+            _check_folder(Path(self.frames_file), self.force)
+        if self.plot_file:
+            figures.require()
+
+    def write(
+        self, worlds: Mapping[str, World], played: Sequence[RunResult], paper: PaperOptions
+    ) -> None:
+        """Writes the files of runs; frames and strip are of the first."""
+        if self.csv_file:
+            write_bytes(self.csv_file, as_csv(played).encode(), force=self.force)
+        if self.plot_file:
+            write_bytes(self.plot_file, figures.picture(played, self.measure), force=self.force)
+        first = worlds[played[0].walk]
+        if self.frames_file:
+            folder = Path(self.frames_file)
+            with writing(folder):
+                folder.mkdir(parents=True, exist_ok=True)
+            for name, data in figures.frames(first, played[0].run, self.every):
+                write_bytes(folder / name, data, force=self.force)
+        if self.strip_file:
+            write_bytes(self.strip_file, figures.strip(first, played[0], paper), force=self.force)
+
+
+def pick(cls: type[T], values: Mapping[str, Any]) -> T:
+    """A record of parsed values whose names are those of its fields."""
+    names = (field.name for field in fields(cls))  # type: ignore[arg-type]
+    return cls(**{name: values[name] for name in names if name in values})
+
+
+def _prepare_worlds(
+    db: str,
+    walks: Mapping[str, Walk],
+    options: SimulateOptions,
+    others: OtherForms,
+    progress: Progress,
+) -> tuple[dict[str, World], dict[str, CampusWorld]]:
+    """The worlds of walks, through the database and through the campus, if there is one."""
+    served, compared = read_served(db), read_served(others.against) if others.against else None
     if options.lit:
         served, compared = with_lamp(served), with_lamp(compared) if compared else None
     require_hints(served, options.policies)
-    with console.progress() as progress:
-        pyramids = read_pyramids(served, progress)
-        relief = relief_of(served, pyramids, compared, lit=options.lit, progress=progress)
-        shown = relief.reference.pyramids if relief and relief.reference else pyramids
-        campuses = {
-            name: prepare_campus(campus, walk, compared or served, shown, progress=progress)
-            for name, walk in walks.items()
-            if campus
-        }
-        forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
-        drawing = Drawing(forms=forms, relief=relief)
-        worlds = {
-            name: apply_counting(
-                prepare(served, walk, pyramids, progress=progress, drawing=drawing), options
-            )
-            for name, walk in walks.items()
-        }
-        played = play(worlds, options, trace, progress, flip=flip, campuses=campuses, paper=paper)
-    if csv_file:
-        write_bytes(csv_file, as_csv(played).encode(), force=force)
-    if plot_file:
-        write_bytes(plot_file, figures.picture(played, measure), force=force)
-    first = worlds[played[0].walk]
-    if frames_to:
-        with writing(frames_to):
-            frames_to.mkdir(parents=True, exist_ok=True)
-        for name, data in figures.frames(first, played[0].run, every):
-            write_bytes(frames_to / name, data, force=force)
-    if strip_file:
-        write_bytes(strip_file, figures.strip(first, played[0], paper), force=force)
-    paper_options = paper if with_paper else None
-    lines = table(played, worlds, lit=options.lit, against=against, campuses=campuses)
-    if given := arguments([paper]):
-        lines.insert(0, f"policy paper with {' '.join(given)}")
-    result = document(db, played, worlds, lit=options.lit, against=against, paper=paper_options)
-    console.result(result, lines)
+    pyramids = read_pyramids(served, progress)
+    relief = relief_of(served, pyramids, compared, lit=options.lit, progress=progress)
+    shown = relief.reference.pyramids if relief and relief.reference else pyramids
+    campuses = {
+        name: prepare_campus(others.campus, walk, compared or served, shown, progress=progress)
+        for name, walk in walks.items()
+        if others.campus
+    }
+    forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
+    drawing = Drawing(forms=forms, relief=relief)
+    worlds = {
+        name: apply_counting(
+            prepare(served, walk, pyramids, progress=progress, drawing=drawing), options
+        )
+        for name, walk in walks.items()
+    }
+    return worlds, campuses
 
 
 def _check_campus(options: SimulateOptions, campus: str | None, *, drawn: bool) -> None:

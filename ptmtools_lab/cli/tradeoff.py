@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
 from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.walk import read_walk
+from ptmtools.progress import Progress
+from ptmtools.walk import Walk, read_walk
+from ptmtools_lab.cli.simulation import pick
 from ptmtools_lab.figures import require
 from ptmtools_lab.path.making import path_through
 from ptmtools_lab.path.options import PathOptions
@@ -114,14 +117,7 @@ def tradeoff(
     stages: tuple[str, ...],
     walk_file: str | None,
     knobs: tuple[str, ...],
-    minutes: float,
-    quick: bool,
     wanted: float | None,
-    cells_tried: int,
-    reference: int,
-    csv_file: str | None,
-    plot_file: str | None,
-    force: bool,
     **values: Any,
 ) -> None:
     """Measure the cost and the benefit of settings on the scene of DB. The command does not change
@@ -131,44 +127,19 @@ def tradeoff(
     the settings that only gain, then those with gains and losses. The second part is the accuracy
     of each stage; a star marks settings that no cheaper one surpasses.
     """
-    options = take(WalkOptions, values)
+    options, output = take(WalkOptions, values), pick(TradeOutput, values)
     stages = stages or (WALK, *EXPERIMENTS)
     if WALK not in stages and (walk_file or knobs):
         given = "--walk" if walk_file else "--option"
         raise click.UsageError(f"{given} needs --stage {WALK}")
     walk = read_walk(walk_file) if walk_file else None
-    for file in (csv_file, plot_file):
-        if file:
-            check_writable(file, force=force)
-    if plot_file:
-        require()
+    output.check()
     artifacts = Artifacts(open_database(db))
-    subject = Subject(artifacts, cells_tried, reference)
-    walked: list[WalkTrade] = []
-    trades = []
-    deadline = Deadline(minutes)
     with console.progress() as progress:
-        for number, stage in enumerate(stages):
-            remaining = len(stages) - number
-            until = deadline.part(max(_SHARE, 1 / remaining) if stage == WALK else 1 / remaining)
-            progress(0, 1, f"preparing {stage}")
-            if stage == WALK:
-                duration = QUICK if quick else DURATION
-                walk = walk or path_through(artifacts, PathOptions(duration=duration)).walk
-                walked.append(
-                    try_settings(
-                        artifacts, walk, options, knobs,
-                        quick=quick, deadline=until, progress=progress, tell=console.warn,
-                    )
-                )  # fmt: skip
-            else:
-                experiment = {**EXPERIMENTS, **FURTHER}[stage].load()(subject)
-                trades.append(run(stage, experiment, progress, until))
-    every = [trade for walk in walked for trade in sentences.trades(walk)] + trades
-    if csv_file:
-        write_bytes(csv_file, as_csv(every).encode(), force=force)
-    if plot_file:
-        write_bytes(plot_file, picture(every), force=force)
+        tell = console.warn
+        effort = pick(Effort, values)
+        walked, trades = effort.spend(stages, artifacts, (walk, options, knobs), progress, tell)
+    output.write([trade for walk in walked for trade in sentences.trades(walk)] + trades)
     first = [
         {"stage": WALK, "sentences": sentences.sentences(trade), **asdict(trade)}
         for trade in walked
@@ -179,6 +150,75 @@ def tradeoff(
     console.result(document, (line for lines in blocks for line in (*lines, "")))
     for trade in walked:
         require_prices(trade, Path(db))
+
+
+@dataclass(frozen=True)
+class Effort:
+    """The options of `tradeoff` on its own time and accuracy."""
+
+    minutes: float
+    quick: bool
+    cells_tried: int
+    reference: int
+
+    def spend(
+        self,
+        stages: Sequence[str],
+        artifacts: Artifacts,
+        walking: tuple[Walk | None, WalkOptions, Sequence[str]],
+        progress: Progress,
+        tell: Callable[[str], None],
+    ) -> tuple[list[WalkTrade], list[Trade]]:
+        """Runs the experiments, each within its part of the time. ``walking``: the walk, None for a
+        new one, the clients, and the options to try."""
+        walk, options, knobs = walking
+        subject, deadline = (
+            Subject(artifacts, self.cells_tried, self.reference),
+            Deadline(self.minutes),
+        )
+        walked: list[WalkTrade] = []
+        trades = []
+        for number, stage in enumerate(stages):
+            remaining = len(stages) - number
+            until = deadline.part(max(_SHARE, 1 / remaining) if stage == WALK else 1 / remaining)
+            progress(0, 1, f"preparing {stage}")
+            if stage == WALK:
+                duration = QUICK if self.quick else DURATION
+                walk = walk or path_through(artifacts, PathOptions(duration=duration)).walk
+                walked.append(
+                    try_settings(
+                        artifacts, walk, options, knobs,
+                        quick=self.quick, deadline=until, progress=progress, tell=tell,
+                    )
+                )  # fmt: skip
+            else:
+                experiment = {**EXPERIMENTS, **FURTHER}[stage].load()(subject)
+                trades.append(run(stage, experiment, progress, until))
+        return walked, trades
+
+
+@dataclass(frozen=True)
+class TradeOutput:
+    """The files to write beside the report."""
+
+    csv_file: str | None
+    plot_file: str | None
+    force: bool
+
+    def check(self) -> None:
+        """Raises, before anything is measured, what writing would raise."""
+        for file in (self.csv_file, self.plot_file):
+            if file:
+                check_writable(file, force=self.force)
+        if self.plot_file:
+            require()
+
+    def write(self, trades: Sequence[Trade]) -> None:
+        """Writes the files."""
+        if self.csv_file:
+            write_bytes(self.csv_file, as_csv(trades).encode(), force=self.force)
+        if self.plot_file:
+            write_bytes(self.plot_file, picture(trades), force=self.force)
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:

@@ -251,17 +251,7 @@ def try_settings(
     _warm_up()
     policies = ["", *dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy)]
     trials = _Trials(db, recorded, _Walker(walk, original, options), policies)
-    number, total = count(len(chosen), "setting"), sum(map(trials.estimate, chosen))
-    where = " and ".join(rate_text(link.bandwidth) for link in options.links())
-    limit = (
-        ""
-        if total < deadline.remaining
-        else f", of which {minutes(deadline.remaining)} are allowed"
-    )
-    tell(
-        f"{number} on a walk of {walk.duration:.0f} s at {where} with {options.memory} of texture "
-        f"memory; about {minutes(total)}{limit}"
-    )
+    tell(_plan_text(options, walk, len(chosen), sum(map(trials.estimate, chosen)), deadline))
     tried: dict[int, WalkTrial] = {}
     for done, k in enumerate(by_turns(chosen)):
         if not tried or trials.estimate(chosen[k]) <= deadline.remaining:
@@ -270,6 +260,18 @@ def try_settings(
     untried = tuple(setting.name for k, setting in enumerate(chosen) if k not in tried)
     in_order = tuple(tried[k] for k in sorted(tried))
     return WalkTrade(walk.duration, trials.unchanged, in_order, untried)
+
+
+def _plan_text(
+    options: WalkOptions, walk: Walk, number: int, seconds: float, deadline: Deadline
+) -> str:
+    allowed = deadline.remaining
+    limit = "" if seconds < allowed else f", of which {minutes(allowed)} are allowed"
+    where = " and ".join(rate_text(link.bandwidth) for link in options.links())
+    return (
+        f"{count(number, 'setting')} on a walk of {walk.duration:.0f} s at {where} with "
+        f"{options.memory} of texture memory; about {minutes(seconds)}{limit}"
+    )
 
 
 @cache

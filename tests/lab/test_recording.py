@@ -55,7 +55,7 @@ def test_what_waits() -> None:
     waits = Waits(np.array([[1.0, 2.0], [1.5, 3.0], [1.6, 1.7]]), np.array([[2.5, 3.5]]))
     moments = [0.5, 1.0, 1.65, 1.8, 2.1, 3.2, 3.5, 9.0]
     assert [waits.wait_end(m) for m in moments] == [0.5, 1.7, 1.7, 2.0, 3.0, 3.5, 3.5, 9.0]
-    assert Waits(np.zeros((0, 2))).until(1.0) == 1.0
+    assert Waits(np.zeros((0, 2))).wait_end(1.0) == 1.0
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from ptmtools.walk import read_walk
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.simulation import simulate_campus
 from ptmtools_lab.campus.stock import read_stock
-from ptmtools_lab.campus.world import prepare_campus
+from ptmtools_lab.campus.world import CampusFrames, prepare_campus
 from ptmtools_systems.campus.model import PRESETS, distances
 
 from .test_recording import AT_ONCE
@@ -131,7 +131,7 @@ def test_a_recording_replays(
     walk = read_walk(file)
     assert walk.aspect == pytest.approx(320 / 240)
     assert walk.eye[[0, -1], 0].tolist() == [-25, 25]
-    place = prepare_campus(campus, walk, every=0)
+    place = prepare_campus(campus, walk, frames=CampusFrames(every=0))
     options = CampusWalkOptions(bandwidth="4M", latency="20ms")
     run = simulate_campus(place, PRESETS[1], options)
     assert run.begun

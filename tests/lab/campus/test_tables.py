@@ -25,6 +25,7 @@ from ptmtools_lab.campus.world import (
     COARSE,
     FINE,
     NOTHING,
+    CampusFrames,
     CampusTables,
     CampusWorld,
     FullPicture,
@@ -132,7 +133,7 @@ def bilinear(image: Floats, at: Floats) -> Floats:
 
 @pytest.fixture(scope="module")
 def world(folder: Path) -> CampusWorld:
-    return prepare_campus(folder, WALK, rate=1.0, pixels=PIXELS)
+    return prepare_campus(folder, WALK, frames=CampusFrames(1.0, PIXELS))
 
 
 @pytest.fixture(scope="module")
