@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ptmtools_samples.brush import painted, pick, woven
+from ptmtools_samples.brush import paint, pick, weave_canvas
 from ptmtools_samples.noise import (
     Color,
     axes,
@@ -14,7 +14,7 @@ from ptmtools_samples.noise import (
     fractal,
     ramp,
     step,
-    warped,
+    warp,
     wave,
 )
 
@@ -44,7 +44,7 @@ def color_field(rng: np.random.Generator, size: int) -> Image.Image:
             ramp(wash, (0.2, palette[(k + 1) % 3]), (0.9, light)),
             inside_y * inside_x * (np.float32(0.65) + wash * np.float32(0.35)),
         )
-    return painted(rng, image, [(2500, 0.08, 0.012), (4000, 0.04, 0.004)], swirl=0.05)
+    return paint(rng, image, [(2500, 0.08, 0.012), (4000, 0.04, 0.004)], swirl=0.05)
 
 
 def drips(rng: np.random.Generator, size: int) -> Image.Image:
@@ -71,10 +71,10 @@ def drips(rng: np.random.Generator, size: int) -> Image.Image:
         for px, py in points[:: int(rng.integers(9, 30))]:
             r = wide * int(rng.integers(1, 4)) // 2
             draw.ellipse((px - r, py - r, px + r, py + r), fill=fill)
-    return woven(rng, canvas.reduce(2))
+    return weave_canvas(rng, canvas.reduce(2))
 
 
-def constructed(rng: np.random.Generator, size: int) -> Image.Image:
+def constructivism(rng: np.random.Generator, size: int) -> Image.Image:
     """Rectangles in primary colours between black bars."""
     image = ramp(fractal(rng, size, 6, 6, 6, 0.6), (0.2, (226, 220, 206)), (0.8, (244, 240, 230)))
     x, y = axes(size)
@@ -111,7 +111,7 @@ def constructed(rng: np.random.Generator, size: int) -> Image.Image:
                 np.float32(1) - step(np.abs(y - np.float32(c)), 0.012, 0.015), (size, size)
             ),
         )
-    return woven(rng, Image.fromarray(bytes_of(image)))
+    return weave_canvas(rng, Image.fromarray(bytes_of(image)))
 
 
 def _pick_palette(rng: np.random.Generator) -> list[Color]:
@@ -123,14 +123,16 @@ def _pick_palette(rng: np.random.Generator) -> list[Color]:
     return palettes[int(rng.integers(len(palettes)))]
 
 
-def marbled(rng: np.random.Generator, size: int) -> Image.Image:
+def marble_paper(rng: np.random.Generator, size: int) -> Image.Image:
     """Marbled paper: bands of colour distorted twice."""
     bands = fractal(rng, size, 3, 3, 3)
     for reach in (0.5, 0.25):
         dx, dy = (fractal(rng, size, 3, 3, 5) - np.float32(0.5) for _ in range(2))
-        bands = warped(bands, dx * np.float32(reach), dy * np.float32(reach))
+        bands = warp(bands, dx * np.float32(reach), dy * np.float32(reach))
     tone = wave(bands * np.float32(6)) * np.float32(0.5) + np.float32(0.5)
     stops = _pick_palette(rng)
     image = ramp(tone, (0.0, stops[0]), (0.35, stops[1]), (0.65, stops[2]), (1.0, stops[3]))
     vein = np.float32(1) - step(np.abs(tone - np.float32(0.5)), 0.0, 0.05)
-    return woven(rng, Image.fromarray(bytes_of(blend(image, (30, 24, 30), vein * np.float32(0.7)))))
+    return weave_canvas(
+        rng, Image.fromarray(bytes_of(blend(image, (30, 24, 30), vein * np.float32(0.7))))
+    )

@@ -21,7 +21,7 @@ def pick(rng: np.random.Generator, colors: list[Color]) -> Color:
     return colors[int(rng.integers(len(colors)))]
 
 
-def painted(
+def paint(
     rng: np.random.Generator,
     image: Field,
     passes: list[tuple[int, float, float]],
@@ -58,10 +58,10 @@ def painted(
             np.stack([2 * x - ex, 2 * y - ey, 2 * x + ex, 2 * y + ey], 1).tolist()
         ):
             draw.line((a, b, c, d), fill=tuple(color[k]), width=width)
-    return woven(rng, canvas.reduce(2))
+    return weave_canvas(rng, canvas.reduce(2))
 
 
-def woven(rng: np.random.Generator, image: Image.Image) -> Image.Image:
+def weave_canvas(rng: np.random.Generator, image: Image.Image) -> Image.Image:
     """The weave of the canvas and uneven varnish over a finished picture."""
     size = image.width
     x, y = axes(size)
@@ -79,7 +79,7 @@ FINE = [(1800, 0.05, 0.02), (5000, 0.025, 0.008), (7000, 0.012, 0.004)]
 BOLD = [(1500, 0.06, 0.03), (3500, 0.035, 0.014), (3000, 0.02, 0.007)]
 
 
-def lettered(
+def draw_letters(
     image: Image.Image,
     lines: list[tuple[str, float, float, float, Color]],
     *,
@@ -97,10 +97,10 @@ def lettered(
     return big.reduce(2)
 
 
-def signed(rng: np.random.Generator, image: Image.Image) -> Image.Image:
+def sign(rng: np.random.Generator, image: Image.Image) -> Image.Image:
     name = ("A. Ferrand", "M. Oude", "L. Castell", "J. Brandt", "E. Sorel")[int(rng.integers(5))]
     year = str(int(rng.integers(1780, 1930)))
-    return lettered(image, [(f"{name} {year}", 0.84, 0.95, 0.026, (58, 24, 16))])
+    return draw_letters(image, [(f"{name} {year}", 0.84, 0.95, 0.026, (58, 24, 16))])
 
 
 def disk(size: int, cx: float, cy: float, rx: float, ry: float) -> Field:
@@ -110,5 +110,5 @@ def disk(size: int, cx: float, cy: float, rx: float, ry: float) -> Field:
     return u * u + v * v
 
 
-def inside(size: int, cx: float, cy: float, rx: float, ry: float) -> Field:
+def disk_mask(size: int, cx: float, cy: float, rx: float, ry: float) -> Field:
     return np.float32(1) - step(disk(size, cx, cy, rx, ry), 0.94, 1.06)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from ptmtools_samples.brush import BOLD, FINE, disk, inside, painted, pick, signed
+from ptmtools_samples.brush import BOLD, FINE, disk, disk_mask, paint, pick, sign
 from ptmtools_samples.noise import (
     Color,
     Field,
@@ -52,14 +52,16 @@ def landscape(rng: np.random.Generator, size: int) -> Image.Image:
     for _ in range(int(rng.integers(4, 9))):
         cx, foot = float(rng.random()), 0.66 + 0.26 * float(rng.random())
         tall = (foot - 0.45) * (0.5 + 0.4 * float(rng.random()))
-        image = blend(image, (48, 34, 22), inside(size, cx, foot - tall * 0.4, 0.008, tall * 0.5))
+        image = blend(
+            image, (48, 34, 22), disk_mask(size, cx, foot - tall * 0.4, 0.008, tall * 0.5)
+        )
         leaves = fractal(rng, size, 20, 20, 4)
         crown = disk(size, cx, foot - tall, tall * 0.45, tall * 0.55) + (
             leaves - np.float32(0.5)
         ) * np.float32(1.6)
         shade = ramp(leaves, (0.3, (24, 40, 18)), (0.75, (94, 112, 44)))
         image = blend(image, shade, np.float32(1) - step(crown, 0.7, 1.0))
-    return signed(rng, painted(rng, image, FINE))
+    return sign(rng, paint(rng, image, FINE))
 
 
 def seascape(rng: np.random.Generator, size: int) -> Image.Image:
@@ -96,9 +98,9 @@ def seascape(rng: np.random.Generator, size: int) -> Image.Image:
         ) & ((y < foot) & (y > foot - tall))
         image = blend(image, (238, 224, 196), sail.astype(np.float32))
         image = blend(
-            image, (52, 32, 24), inside(size, cx, foot + tall * 0.08, tall * 0.42, tall * 0.09)
+            image, (52, 32, 24), disk_mask(size, cx, foot + tall * 0.08, tall * 0.42, tall * 0.09)
         )
-    return signed(rng, painted(rng, image, FINE, swirl=0.1))
+    return sign(rng, paint(rng, image, FINE, swirl=0.1))
 
 
 def night(rng: np.random.Generator, size: int) -> Image.Image:
@@ -121,9 +123,11 @@ def night(rng: np.random.Generator, size: int) -> Image.Image:
     for _ in range(40):
         cx, cy = float(rng.random()), 0.78 + 0.2 * float(rng.random())
         image = blend(
-            image, pick(rng, [(250, 200, 90), (230, 150, 60)]), inside(size, cx, cy, 0.008, 0.011)
+            image,
+            pick(rng, [(250, 200, 90), (230, 150, 60)]),
+            disk_mask(size, cx, cy, 0.008, 0.011),
         )
-    return signed(rng, painted(rng, image, BOLD, swirl=0.6))
+    return sign(rng, paint(rng, image, BOLD, swirl=0.6))
 
 
 def portrait(rng: np.random.Generator, size: int) -> Image.Image:
@@ -141,7 +145,7 @@ def portrait(rng: np.random.Generator, size: int) -> Image.Image:
     skin = pick(rng, [(224, 178, 144), (196, 144, 108), (142, 96, 68), (238, 202, 172)])
     hair = pick(rng, [(44, 28, 18), (110, 72, 34), (170, 166, 158), (22, 18, 18)])
 
-    def lit(px: float, py: float, rx: float, ry: float, color: Color) -> None:
+    def light_ball(px: float, py: float, rx: float, ry: float, color: Color) -> None:
         nonlocal image
         u, v = (x - np.float32(px)) / np.float32(rx), (y - np.float32(py)) / np.float32(ry)
         bulge = np.sqrt(np.clip(np.float32(1) - u * u - v * v, 0, 1))
@@ -152,25 +156,27 @@ def portrait(rng: np.random.Generator, size: int) -> Image.Image:
             + (fractal(rng, size, 12, 12, 3) - np.float32(0.5)) * np.float32(0.12)
         )
         body = tone[..., None] * np.asarray(color, dtype=np.float32)
-        image = blend(image, body, inside(size, px, py, rx, ry))
+        image = blend(image, body, disk_mask(size, px, py, rx, ry))
 
-    lit(cx, 0.37, 0.175, 0.235, hair)
-    lit(cx, 1.06, 0.40, 0.42, coat)
-    lit(cx, 0.60, 0.07, 0.14, skin)
-    lit(cx, 0.715, 0.10, 0.06, (236, 230, 214))
-    lit(cx, 0.40, 0.135, 0.19, skin)
-    lit(cx, 0.26, 0.15, 0.09, hair)
+    light_ball(cx, 0.37, 0.175, 0.235, hair)
+    light_ball(cx, 1.06, 0.40, 0.42, coat)
+    light_ball(cx, 0.60, 0.07, 0.14, skin)
+    light_ball(cx, 0.715, 0.10, 0.06, (236, 230, 214))
+    light_ball(cx, 0.40, 0.135, 0.19, skin)
+    light_ball(cx, 0.26, 0.15, 0.09, hair)
     for side in (-1, 1):
-        image = blend(image, (206, 196, 184), inside(size, cx + side * 0.052, 0.385, 0.022, 0.009))
-        image = blend(image, (40, 28, 24), inside(size, cx + side * 0.052, 0.385, 0.013, 0.012))
-        image = blend(image, hair, inside(size, cx + side * 0.052, 0.355, 0.034, 0.007))
-    image = blend(image, (150, 74, 64), inside(size, cx, 0.50, 0.042, 0.012))
-    lit(cx - 0.004, 0.435, 0.02, 0.045, skin)
+        image = blend(
+            image, (206, 196, 184), disk_mask(size, cx + side * 0.052, 0.385, 0.022, 0.009)
+        )
+        image = blend(image, (40, 28, 24), disk_mask(size, cx + side * 0.052, 0.385, 0.013, 0.012))
+        image = blend(image, hair, disk_mask(size, cx + side * 0.052, 0.355, 0.034, 0.007))
+    image = blend(image, (150, 74, 64), disk_mask(size, cx, 0.50, 0.042, 0.012))
+    light_ball(cx - 0.004, 0.435, 0.02, 0.045, skin)
     for k in range(4):
         image = blend(
-            image, (210, 172, 80), inside(size, cx + 0.012, 0.80 + 0.055 * k, 0.011, 0.011)
+            image, (210, 172, 80), disk_mask(size, cx + 0.012, 0.80 + 0.055 * k, 0.011, 0.011)
         )
-    return signed(rng, painted(rng, image, FINE))
+    return sign(rng, paint(rng, image, FINE))
 
 
 def still_life(rng: np.random.Generator, size: int) -> Image.Image:
@@ -193,7 +199,7 @@ def still_life(rng: np.random.Generator, size: int) -> Image.Image:
             (-0.2, (34, 66, 44)),
             (1.0, (10, 22, 16)),
         )
-        image = blend(image, glass, inside(size, bx, cy, rx, ry))
+        image = blend(image, glass, disk_mask(size, bx, cy, rx, ry))
     fruits = sorted(
         (
             0.58 + 0.28 * float(rng.random()),
@@ -209,7 +215,7 @@ def still_life(rng: np.random.Generator, size: int) -> Image.Image:
         image = blend(
             image,
             (46, 36, 34),
-            inside(size, cx + r * 0.5, cy + r * 0.8, r * 1.2, r * 0.35) * np.float32(0.6),
+            disk_mask(size, cx + r * 0.5, cy + r * 0.8, r * 1.2, r * 0.35) * np.float32(0.6),
         )
         u, v = (x - np.float32(cx)) / np.float32(r), (y - np.float32(cy)) / np.float32(r)
         bulge = np.sqrt(np.clip(np.float32(1) - u * u - v * v, 0, 1))
@@ -219,11 +225,11 @@ def still_life(rng: np.random.Generator, size: int) -> Image.Image:
         image = blend(
             image,
             tone[..., None] * np.asarray(color, dtype=np.float32),
-            inside(size, cx, cy, r, r),
+            disk_mask(size, cx, cy, r, r),
         )
         image = blend(
             image,
             (255, 246, 226),
-            inside(size, cx - r * 0.35, cy - r * 0.4, r * 0.13, r * 0.11) * np.float32(0.8),
+            disk_mask(size, cx - r * 0.35, cy - r * 0.4, r * 0.13, r * 0.11) * np.float32(0.8),
         )
-    return signed(rng, painted(rng, image, FINE))
+    return sign(rng, paint(rng, image, FINE))

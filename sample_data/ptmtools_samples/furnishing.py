@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.errors import InputError
-from ptmtools_samples.mesh import Face, Point, Thing, Uv, block, tiled
+from ptmtools_samples.mesh import Face, Point, Thing, Uv, block, tile_face
 from ptmtools_samples.plan import STAIR_LANDING, STAIR_RUN, STOREY, Plan, PlanBox
 from ptmtools_samples.shell import TILE, Panel
 
@@ -104,7 +104,7 @@ def _picture(
     bar = (0.04, 0.06, 0.09)[int(rng.integers(3))]
     frame = ("frame_gilt", "frame_gilt", "frame_dark", "frame_black")[int(rng.integers(4))]
 
-    def at(u: float, v: float, d: float) -> Point:
+    def point(u: float, v: float, d: float) -> Point:
         wall = panel.position / 1000 + panel.side * d
         along = place.along + right * u
         return (
@@ -114,17 +114,17 @@ def _picture(
     inner = [(-w, -h), (w, -h), (w, h), (-w, h)]
     outer = [(u + math.copysign(bar, u), v + math.copysign(bar, v)) for u, v in inner]
     unit: tuple[Uv, ...] = ((0, 0), (1, 0), (1, 1), (0, 1))
-    canvas = Face(f"painting_{picture + 1:02d}", tuple(at(*c, back) for c in inner), unit)
+    canvas = Face(f"painting_{picture + 1:02d}", tuple(point(*c, back) for c in inner), unit)
     faces = [canvas]
     front = back + FRAME_DEPTH
     for k in range(4):
         o, p, i, j = outer[k], outer[k - 3], inner[k], inner[k - 3]
         length = round(2 * (h if k % 2 else w) / 0.25)
         for quad in (
-            (at(*o, front), at(*p, front), at(*j, front), at(*i, front)),
-            (at(*o, back), at(*p, back), at(*p, front), at(*o, front)),
-            (at(*i, front), at(*j, front), at(*j, back), at(*i, back)),
-            (at(*i, back), at(*j, back), at(*p, back), at(*o, back)),
+            (point(*o, front), point(*p, front), point(*j, front), point(*i, front)),
+            (point(*o, back), point(*p, back), point(*p, front), point(*o, front)),
+            (point(*i, front), point(*j, front), point(*j, back), point(*i, back)),
+            (point(*i, back), point(*j, back), point(*p, back), point(*o, back)),
         ):
             faces.append(Face(frame, quad, ((0, 0), (length, 0), (length, 1), (0, 1))))
     return Thing(name, faces)
@@ -138,7 +138,7 @@ def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
     for box in plan.of_kind("room"):
         spots = [(0.27, 0.27), (0.73, 0.27), (0.27, 0.73), (0.73, 0.73)]
         for k in rng.permutation(4)[: int(rng.integers(0, 4))]:
-            x, z = (_between(box, axis, spots[k][axis // 2]) for axis in (0, 2))
+            x, z = (_metres_between(box, axis, spots[k][axis // 2]) for axis in (0, 2))
             kind = STATUES[int(rng.integers(len(STATUES)))]
             name = f"statue_{len(statues) + 1:02d}"
             statues.append(Thing(name, kind(x, box.low[1] / 1000, z)))
@@ -149,7 +149,7 @@ def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
             _bench(len(benches) + 1 + k, box, share, 0) for k, share in enumerate((0.3, 0.7))
         ]
     ground = next(box for box in plan.of_kind("corridor") if box.storey == 0)
-    z = _between(ground, 2, 0.5)
+    z = _metres_between(ground, 2, 0.5)
     # Two leaves on either side of the wall, which stays closed behind them.
     leaves = [
         face
@@ -163,12 +163,12 @@ def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
     return things
 
 
-def _between(box: PlanBox, axis: int, share: float) -> float:
+def _metres_between(box: PlanBox, axis: int, share: float) -> float:
     return round((box.low[axis] + (box.high[axis] - box.low[axis]) * share) / 1000, 2)
 
 
 def _bench(number: int, box: PlanBox, share: float, turned: int) -> Thing:
-    x, z, y = _between(box, 0, share), _between(box, 2, 0.5), box.low[1] / 1000
+    x, z, y = _metres_between(box, 0, share), _metres_between(box, 2, 0.5), box.low[1] / 1000
     a, b = (0.3, 0.9) if turned else (0.9, 0.3)
     faces = block("wood", (x - a, y + 0.38, z - b), (x + a, y + 0.46, z + b), 0.9)
     for s in (-1, 1):
@@ -200,7 +200,7 @@ def _stairs(shaft: PlanBox, storeys: int) -> list[Thing]:
         up = _flight(x0, landing, y, rise, south, inner=0)
         under = half - 2 * rise  # the flight ends below the underside of the landing
         end = [(under, south[1]), (under, south[0]), (half - 0.2, south[0]), (half - 0.2, south[1])]
-        up.append(tiled("stone", tuple((landing, h, z) for h, z in end), 2.0))
+        up.append(tile_face("stone", tuple((landing, h, z) for h, z in end), 2.0))
         things.append(Thing(f"{name}_flight{storey}_up", up))
         things.append(
             Thing(f"{name}_flight{storey}_on", _flight(landing, x0, half, rise, north, inner=1))
@@ -229,7 +229,7 @@ def _flight(
     faces: list[Face] = []
 
     def facing(points: list[Point], outward: bool) -> Face:
-        return tiled("stone", tuple(points if outward else points[::-1]), 2.0)
+        return tile_face("stone", tuple(points if outward else points[::-1]), 2.0)
 
     for k in range(RISERS - 1):
         a, b = start + run * k, start + run * (k + 1)
@@ -263,7 +263,7 @@ def _guard(start: float, stop: float, y: float, rise: float, z: float) -> list[F
     for k in range(4):
         (p, q), (r, s) = corners[k], corners[k - 3]
         loops.append([(p, q, z), (r, s, z), (r, s, Z), (p, q, Z)])
-    return [tiled("wood", tuple(loop), 1.5) for loop in loops]
+    return [tile_face("wood", tuple(loop), 1.5) for loop in loops]
 
 
 def _lathe(
@@ -300,8 +300,8 @@ def _lathe(
             r, s = rings[i + 1][(k + 1) % segments], rings[i + 1][k]
             faces.append(Face(material, (p, q, r), ((u, v), (U, v), (U, V))))
             faces.append(Face(material, (p, r, s), ((u, v), (U, V), (u, V))))
-    faces.append(tiled(material, tuple(rings[-1]), 1.0))
-    faces.append(tiled(material, tuple(reversed(rings[0])), 1.0))
+    faces.append(tile_face(material, tuple(rings[-1]), 1.0))
+    faces.append(tile_face(material, tuple(reversed(rings[0])), 1.0))
     return faces
 
 

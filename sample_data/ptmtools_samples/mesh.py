@@ -38,7 +38,7 @@ def cross(a: Point, b: Point) -> Point:
     )
 
 
-def tiled(material: str, points: tuple[Point, ...], tile: float) -> Face:
+def tile_face(material: str, points: tuple[Point, ...], tile: float) -> Face:
     """A face whose image repeats every ``tile`` metres.
 
     A steep face is mapped upright as seen from its front: u to the viewer's right, v up. A flat
@@ -70,4 +70,4 @@ def block(
         "-z": ((X, y, z), (x, y, z), (x, Y, z), (X, Y, z)),
         "+z": ((x, y, Z), (X, y, Z), (X, Y, Z), (x, Y, Z)),
     }
-    return [tiled(material, p, tile) for side, p in sides.items() if side not in without]
+    return [tile_face(material, p, tile) for side, p in sides.items() if side not in without]

@@ -46,7 +46,7 @@ def wave(t: Field) -> Field:
     return np.asarray(np.float32(4) * f * (np.abs(f) - np.float32(1)))
 
 
-def _interpolated(values: Field, size: int, axis: int) -> Field:
+def _interpolate(values: Field, size: int, axis: int) -> Field:
     """``values`` (periodic lattice) resampled to ``size`` along an axis."""
     n = values.shape[axis]
     t = (np.arange(size, dtype=np.float32) + np.float32(0.5)) * np.float32(n) / np.float32(size)
@@ -61,7 +61,7 @@ def _interpolated(values: Field, size: int, axis: int) -> Field:
 def value_noise(rng: np.random.Generator, size: int, nx: int, ny: int) -> Field:
     """(size, size) noise in 0…1 from a periodic lattice of nx × ny values: it tiles."""
     lattice = rng.random((ny, nx), dtype=np.float32)
-    return _interpolated(_interpolated(lattice, size, 0), size, 1)
+    return _interpolate(_interpolate(lattice, size, 0), size, 1)
 
 
 def fractal(
@@ -88,13 +88,13 @@ def ridge(rng: np.random.Generator, size: int, cells: int, octaves: int) -> Fiel
     strength, sum_ = 1.0, 0.0
     for k in range(octaves):
         lattice = rng.random((1, cells << k), dtype=np.float32)
-        total += np.float32(strength) * _interpolated(lattice, size, 1)
+        total += np.float32(strength) * _interpolate(lattice, size, 1)
         sum_ += strength
         strength *= 0.5
     return np.asarray(total / np.float32(sum_))
 
 
-def warped(field: Field, dx: Field, dy: Field) -> Field:
+def warp(field: Field, dx: Field, dy: Field) -> Field:
     """Samples the periodic ``field`` displaced by dx, dy (shares of its size), right and down."""
     size = field.shape[0]
     x, y = axes(size)

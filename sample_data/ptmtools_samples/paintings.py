@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 
-from ptmtools_samples.abstract import color_field, constructed, drips, marbled
+from ptmtools_samples.abstract import color_field, constructivism, drips, marble_paper
 from ptmtools_samples.figurative import landscape, night, portrait, seascape, still_life
 from ptmtools_samples.printed import manuscript, poster
 
@@ -27,8 +27,8 @@ PAINTINGS: list[tuple[str, Painting, float]] = [
     ("still_life", still_life, 5 / 4),
     ("color_field", color_field, 4 / 5),
     ("night", night, 5 / 4),
-    ("constructed", constructed, 1.0),
+    ("constructed", constructivism, 1.0),
     ("manuscript", manuscript, 3 / 4),
     ("drips", drips, 4 / 3),
-    ("marbled", marbled, 1.0),
+    ("marbled", marble_paper, 1.0),
 ]

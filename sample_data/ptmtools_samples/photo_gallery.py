@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ptmtools_samples.files import HEAD, File, Note, ignore, png
-from ptmtools_samples.mesh import Face, Point, Thing, Uv, tiled
+from ptmtools_samples.mesh import Face, Point, Thing, Uv, tile_face
 from ptmtools_samples.noise import generator
 from ptmtools_samples.obj import obj_text
 from ptmtools_samples.options import PhotoGalleryOptions
@@ -59,12 +59,12 @@ def hung(images: list[Photo], least: float = 2.0) -> tuple[float, list[Thing]]:
     """Returns the least length, from ``least`` on, of a hall that holds all images, and the hung
     images."""
     length = least
-    while (walls := _filled(images, length)) is None:
+    while (walls := _fill_hall(images, length)) is None:
         length += 0.5
     return length, walls
 
 
-def _filled(images: list[Photo], length: float) -> list[Thing] | None:
+def _fill_hall(images: list[Photo], length: float) -> list[Thing] | None:
     """Hangs the images on the walls of a hall of the given length; None if they do not fit."""
     deep = round(length * WIDTH_RATIO, 3)
     waiting, things = list(images), []
@@ -102,13 +102,13 @@ def hall(length: float) -> list[Thing]:
     ground = ((0.0, 0.0), (x, 0.0), (x, z), (0.0, z))
     flat: list[Point] = [(a, 0.0, b) for a, b in reversed(ground)]
     things = [
-        Thing("floor", [tiled("floor", tuple(flat), 1.0)]),
-        Thing("ceiling", [tiled("ceiling", tuple((a, HEIGHT, b) for a, b in ground), 1.0)]),
+        Thing("floor", [tile_face("floor", tuple(flat), 1.0)]),
+        Thing("ceiling", [tile_face("ceiling", tuple((a, HEIGHT, b) for a, b in ground), 1.0)]),
     ]
     for k, name in enumerate(("north", "east", "south", "west")):
         (a, b), (c, d) = ground[k], ground[(k + 1) % 4]
         points: tuple[Point, ...] = ((a, 0.0, b), (c, 0.0, d), (c, HEIGHT, d), (a, HEIGHT, b))
-        things.append(Thing(f"wall_{name}", [tiled("wall", points, 1.0)]))
+        things.append(Thing(f"wall_{name}", [tile_face("wall", points, 1.0)]))
     return things
 
 

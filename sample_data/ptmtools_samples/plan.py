@@ -96,7 +96,8 @@ def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> 
         order = [widths[k] for k in rng.permutation(columns)] if storey else widths
         starts = np.cumsum([0, *[w + INNER_WALL for w in order]]).tolist()
         slots = [(c, s) for c in range(columns) for s in range(strips)][:room_count]
-        _storey(plan, storey, number, slots, starts, order, depths, rng, windows)
+        grid = _Grid(slots, starts, order, depths)
+        _plan_storey(plan, grid, storey, number, rng, windows=windows)
         number += room_count
 
     depth = _strip_start(strips - 1, depths) + depths[-1]
@@ -117,38 +118,46 @@ def _strip_start(strip: int, depths: list[int]) -> int:
     return sum(depths[:strip]) + corridors * CORRIDOR_WIDTH + walls * INNER_WALL
 
 
-def _storey(
-    plan: Plan,
-    storey: int,
-    number: int,
-    slots: list[tuple[int, int]],
-    starts: list[int],
-    widths: list[int],
-    depths: list[int],
-    rng: np.random.Generator,
-    windows: bool,
-) -> None:
-    """Plans one floor: rooms in their slots (column, strip), corridors, doorways, windows."""
+@dataclass(frozen=True)
+class _Grid:
+    """The rooms of a floor: their slots (column, strip), where columns start, mm, and the widths of
+    columns and depths of strips."""
+
+    slots: list[tuple[int, int]]
+    starts: list[int]
+    widths: list[int]
+    depths: list[int]
+
+    @property
+    def length(self) -> int:
+        return self.starts[-1] - INNER_WALL
+
+
+def _plan_rooms(grid: _Grid, storey: int, number: int) -> dict[tuple[int, int], PlanBox]:
+    """The rooms of a floor by their slots; ``number`` are below it."""
     base = storey * STOREY
-    length = starts[-1] - INNER_WALL
     room: dict[tuple[int, int], PlanBox] = {}
-    for k, (column, strip) in enumerate(slots):
-        z = _strip_start(strip, depths)
+    for k, (column, strip) in enumerate(grid.slots):
+        z = _strip_start(strip, grid.depths)
         # The last room takes the rest of its strip, so all solid is wall.
-        last = (column + 1, strip) not in slots
-        end = length if last else starts[column] + widths[column]
+        last = (column + 1, strip) not in grid.slots
+        end = grid.length if last else grid.starts[column] + grid.widths[column]
         room[column, strip] = PlanBox(
             name=f"room{number + k + 1:02d}",
             kind="room",
             storey=storey,
-            low=(starts[column], base, z),
-            high=(end, base + ROOM_HEIGHT, z + depths[strip]),
+            low=(grid.starts[column], base, z),
+            high=(end, base + ROOM_HEIGHT, z + grid.depths[strip]),
             wall=WALLS[(number + k) % len(WALLS)],
             floor=FLOORS[(number + k) % len(FLOORS)],
             ceiling="ceiling",
         )
-    plan.boxes += room.values()
+    return room
 
+
+def _plan_corridors(grid: _Grid, storey: int) -> list[PlanBox]:
+    """The corridor of each wing of a floor."""
+    base, depths = storey * STOREY, grid.depths
     corridors = []
     for wing in range((len(depths) + 1) // 2):
         z = _strip_start(2 * wing, depths) + depths[2 * wing] + INNER_WALL
@@ -158,13 +167,22 @@ def _storey(
                 kind="corridor",
                 storey=storey,
                 low=(0, base, z),
-                high=(length - STAIRWELL - INNER_WALL, base + ROOM_HEIGHT, z + CORRIDOR_WIDTH),
+                high=(grid.length - STAIRWELL - INNER_WALL, base + ROOM_HEIGHT, z + CORRIDOR_WIDTH),
                 wall="plaster_cream",
                 floor="stone",
                 ceiling="ceiling",
             )
         )
-    plan.boxes += corridors
+    return corridors
+
+
+def _plan_storey(
+    plan: Plan, grid: _Grid, storey: int, number: int, rng: np.random.Generator, *, windows: bool
+) -> None:
+    """Plans one floor: rooms, corridors, doorways, windows."""
+    base = storey * STOREY
+    room, corridors = _plan_rooms(grid, storey, number), _plan_corridors(grid, storey)
+    plan.boxes += [*room.values(), *corridors]
 
     for (column, strip), box in room.items():
         on_corridor = _door(plan, box, corridors[strip // 2], 2, rng, (1400, 1900))
@@ -193,7 +211,7 @@ def _storey(
             _window(plan, corridor, 0, -1, 1, 1800)
     if windows:
         for (_, strip), box in room.items():
-            if strip in (0, len(depths) - 1):
+            if strip in (0, len(grid.depths) - 1):
                 count = max(1, (box.high[0] - box.low[0]) // 3500)
                 _window(plan, box, 2, 1 if strip else -1, count, 1400)
 

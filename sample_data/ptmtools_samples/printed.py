@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from ptmtools_samples.brush import disk, inside, lettered, pick, woven
+from ptmtools_samples.brush import disk, disk_mask, draw_letters, pick, weave_canvas
 from ptmtools_samples.noise import (
     Color,
     axes,
@@ -53,7 +53,7 @@ def poster(rng: np.random.Generator, size: int) -> Image.Image:
         "Travels in the South",
     )[int(rng.integers(4))]
     year = int(rng.integers(1895, 1935))
-    picture = lettered(
+    picture = draw_letters(
         Image.fromarray(bytes_of(image)),
         [
             (title, 0.5, 0.135, 0.13, ink),
@@ -67,7 +67,7 @@ def poster(rng: np.random.Generator, size: int) -> Image.Image:
             ),
         ],
     )
-    return woven(rng, picture)
+    return weave_canvas(rng, picture)
 
 
 TEXT = (
@@ -101,8 +101,8 @@ def manuscript(rng: np.random.Generator, size: int) -> Image.Image:
             np.float32
         ),
     )
-    image = blend(image, (140, 24, 24), inside(size, 0.78, 0.86, 0.06, 0.06))
-    image = blend(image, (176, 60, 50), inside(size, 0.78, 0.86, 0.042, 0.042))
+    image = blend(image, (140, 24, 24), disk_mask(size, 0.78, 0.86, 0.06, 0.06))
+    image = blend(image, (176, 60, 50), disk_mask(size, 0.78, 0.86, 0.042, 0.042))
     lines: list[tuple[str, float, float, float, Color]] = [
         ("THE CHRONICLE", 0.115, 0.1, 0.07, (124, 26, 22)),
         (_pick_text(rng, "ABDEMR"), 0.155, 0.23, 0.13, (238, 204, 110)),
@@ -115,4 +115,4 @@ def manuscript(rng: np.random.Generator, size: int) -> Image.Image:
         text = " ".join(words[(start + n) % len(words)] for n in range(count))
         start += count
         lines.append((text, indent, 0.175 + 0.042 * k, 0.031, brown))
-    return woven(rng, lettered(Image.fromarray(bytes_of(image)), lines, middle=False))
+    return weave_canvas(rng, draw_letters(Image.fromarray(bytes_of(image)), lines, middle=False))

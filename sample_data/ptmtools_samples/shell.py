@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from ptmtools_samples.mesh import Face, Point, Thing, block, tiled
+from ptmtools_samples.mesh import Face, Point, Thing, block, tile_face
 from ptmtools_samples.plan import Plan, PlanBox
 
 #: Metres per repetition of the image of a surface.
@@ -140,7 +140,7 @@ def make_shell(plan: Plan) -> tuple[list[Thing], list[Panel]]:
                 material = box.wall
             position = box.high[axis] if high else box.low[axis]
             faces = [
-                tiled(material, _side(axis, position, -1 if high else 1, r), TILE[material])
+                tile_face(material, _side(axis, position, -1 if high else 1, r), TILE[material])
                 for r in pieces
             ]
             if box.kind in ("door", "window"):
@@ -156,7 +156,7 @@ def make_shell(plan: Plan) -> tuple[list[Thing], list[Panel]]:
             things.append(whole)
         if box.kind == "window":
             things += _pane(box)
-    things += _outside(plan)
+    things += _outer_walls(plan)
     return things, panels
 
 
@@ -180,12 +180,12 @@ def _pane(box: PlanBox) -> list[Thing]:
         p, q = ((c[0] / 1000, c[1] / 1000, c[2] / 1000) for c in (low, high))
         bars += block("wood", p, q, TILE["wood"], without=frozenset(hidden))
     return [
-        Thing(f"{box.name}_glass", [tiled("glass", _side(axis, middle, 1, r), 1.0)]),
+        Thing(f"{box.name}_glass", [tile_face("glass", _side(axis, middle, 1, r), 1.0)]),
         Thing(f"{box.name}_bars", bars),
     ]
 
 
-def _outside(plan: Plan) -> list[Thing]:
+def _outer_walls(plan: Plan) -> list[Thing]:
     """The outside of the block with its window openings."""
     names = {"floor": "ground_slab", "ceiling": "roof"}
     things = []
@@ -200,7 +200,7 @@ def _outside(plan: Plan) -> list[Thing]:
         ]
         material = "roof" if axis == 1 else "facade"
         faces = [
-            tiled(material, _side(axis, position, 1 if high else -1, r), TILE[material])
+            tile_face(material, _side(axis, position, 1 if high else -1, r), TILE[material])
             for r in rectangles(whole, holes)
         ]
         things.append(Thing(names.get(name, name.replace("wall", "facade")), faces))

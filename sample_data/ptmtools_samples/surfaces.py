@@ -20,14 +20,14 @@ from ptmtools_samples.noise import (
     ramp,
     step,
     value_noise,
-    warped,
+    warp,
     wave,
 )
 
 Surface = Callable[[np.random.Generator, int], Field]
 
 
-def speckled(rng: np.random.Generator, size: int, strength: float) -> Field:
+def speckle(rng: np.random.Generator, size: int, strength: float) -> Field:
     """Fine grain around 0 for every texel."""
     return (rng.random((size, size), dtype=np.float32) - np.float32(0.5)) * np.float32(2 * strength)
 
@@ -37,7 +37,7 @@ def plaster_cream(rng: np.random.Generator, size: int) -> Field:
     stains = fractal(rng, size, 3, 3, 4)
     image = ramp(trowel, (0.2, (206, 196, 176)), (0.5, (226, 218, 200)), (0.8, (240, 234, 220)))
     image = blend(image, (196, 182, 156), step(stains, 0.55, 0.85) * np.float32(0.5))
-    return image + speckled(rng, size, 5)[..., None]
+    return image + speckle(rng, size, 5)[..., None]
 
 
 def _damask(rng: np.random.Generator, size: int, dark: Color, light: Color) -> Field:
@@ -53,7 +53,7 @@ def _damask(rng: np.random.Generator, size: int, dark: Color, light: Color) -> F
     petals = wave(x * np.float32(16)) * wave(y * np.float32(16)) * np.float32(0.3)
     flower = wave(x * np.float32(4)) * wave(y * np.float32(4)) + petals
     pattern = np.maximum(np.float32(1) - step(lattice, 0.05, 0.07), step(flower, 0.62, 0.68))
-    thread = wave(x * np.float32(size // 4)) * np.float32(0.5) + speckled(rng, size, 1)
+    thread = wave(x * np.float32(size // 4)) * np.float32(0.5) + speckle(rng, size, 1)
     wear = fractal(rng, size, 4, 4, 5)
     image = blend(ramp(wear, (0.2, dark), (0.9, dark)), light, pattern * np.float32(0.55))
     worn = np.float32(0.85) + wear * np.float32(0.3)
@@ -108,7 +108,7 @@ def parquet(rng: np.random.Generator, size: int) -> Field:
     ends = np.maximum(np.abs(fx - np.float32(0.5)), np.abs(fy - np.float32(0.5)))
     gap = np.maximum(step(joint, 0.46, 0.495), step(ends, 0.488, 0.499))
     image = ramp(grain, *OAK) * (np.float32(0.75) + tone * np.float32(0.45))[..., None]
-    return blend(image, (48, 28, 14), gap * np.float32(0.8)) + speckled(rng, size, 3)[..., None]
+    return blend(image, (48, 28, 14), gap * np.float32(0.8)) + speckle(rng, size, 3)[..., None]
 
 
 def stone(rng: np.random.Generator, size: int) -> Field:
@@ -129,11 +129,11 @@ def stone(rng: np.random.Generator, size: int) -> Field:
 
 def marble(rng: np.random.Generator, size: int) -> Field:
     a, b = (fractal(rng, size, 4, 4, 5) - np.float32(0.5) for _ in range(2))
-    field = warped(fractal(rng, size, 3, 3, 6), a * np.float32(0.5), b * np.float32(0.5))
+    field = warp(fractal(rng, size, 3, 3, 6), a * np.float32(0.5), b * np.float32(0.5))
     vein = np.float32(1) - np.abs(field - np.float32(0.5)) * np.float32(2)
     image = ramp(field, (0.2, (206, 204, 204)), (0.7, (238, 236, 232)))
     image = blend(image, (128, 124, 130), step(vein, 0.9, 1.0) * np.float32(0.6))
-    return image + speckled(rng, size, 3)[..., None]
+    return image + speckle(rng, size, 3)[..., None]
 
 
 def carpet(rng: np.random.Generator, size: int) -> Field:
@@ -148,7 +148,7 @@ def carpet(rng: np.random.Generator, size: int) -> Field:
     image = blend(image, (200, 176, 128), np.float32(1) - step(diamond, 0.10, 0.11))
     image = blend(image, (44, 70, 60), np.float32(1) - step(diamond, 0.05, 0.06))
     knots = wave(x * np.float32(size // 8)) * wave(y * np.float32(size // 8))
-    return image + (knots * np.float32(9) + speckled(rng, size, 14))[..., None]
+    return image + (knots * np.float32(9) + speckle(rng, size, 14))[..., None]
 
 
 def gilt(rng: np.random.Generator, size: int) -> Field:
@@ -165,7 +165,7 @@ def gilt(rng: np.random.Generator, size: int) -> Field:
         (0.7, (214, 170, 74)),
         (1.0, (252, 232, 160)),
     )
-    return image + speckled(rng, size, 4)[..., None]
+    return image + speckle(rng, size, 4)[..., None]
 
 
 def facade(rng: np.random.Generator, size: int) -> Field:
@@ -185,7 +185,7 @@ def facade(rng: np.random.Generator, size: int) -> Field:
         step(np.abs(t - i - np.float32(0.5)), 0.485, 0.497),
         step(np.abs(fy - np.float32(0.5)), 0.47, 0.495),
     )
-    return blend(image, (110, 98, 78), gap) + speckled(rng, size, 6)[..., None]
+    return blend(image, (110, 98, 78), gap) + speckle(rng, size, 6)[..., None]
 
 
 SURFACES: dict[str, Surface] = {

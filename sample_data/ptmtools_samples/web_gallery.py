@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import io
 import json
-import struct
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ptmtools.glb import glb
 from ptmtools_samples.files import HEAD, File, Note, ignore
 from ptmtools_samples.furnishing import furnish, hang
 from ptmtools_samples.mesh import Face, Thing
@@ -169,6 +169,17 @@ def _primitive(
     }
 
 
+def _material(name: str, source: dict[str, int]) -> dict[str, Any]:
+    """A material without light; ``source``: numbers of textures by their names."""
+    texture, tint, plain = MATERIALS.get(name, (name, (1, 1, 1), (1, 1, 1)))
+    shown = texture in source
+    color = [c**2.2 for c in (tint if shown else plain)]
+    surface: dict[str, Any] = {"baseColorFactor": [*color, 1]}
+    if shown:
+        surface["baseColorTexture"] = {"index": source[texture]}
+    return {"name": name, "pbrMetallicRoughness": surface, "extensions": {UNLIT: {}}}
+
+
 def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> bytes:
     """A GLB with a node for each mesh; ``images`` by the name of the material, or of the texture
     that it uses (`ptmtools_samples.museum.MATERIALS`)."""
@@ -181,17 +192,9 @@ def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> b
     materials: list[dict[str, Any]] = []
     primitives = []
     for mesh in meshes:
-        texture, tint, plain = MATERIALS.get(mesh.material, (mesh.material, (1, 1, 1), (1, 1, 1)))
-        shown = texture in source
-        color = [c**2.2 for c in (tint if shown else plain)]
-        surface: dict[str, Any] = {"baseColorFactor": [*color, 1]}
-        if shown:
-            surface["baseColorTexture"] = {"index": source[texture]}
         primitive = _primitive(mesh, low, extent, buffer, accessors)
         primitives.append({**primitive, "material": len(materials)})
-        materials.append(
-            {"name": mesh.material, "pbrMetallicRoughness": surface, "extensions": {UNLIT: {}}}
-        )
+        materials.append(_material(mesh.material, source))
     pictures = [
         {"name": name, "bufferView": buffer.add(data), "mimeType": "image/jpeg"}
         for name, data in images.items()
@@ -219,18 +222,7 @@ def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> b
         "buffers": [{"byteLength": len(buffer.data)}],
     }
     text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    body = bytes(buffer.data)
-    size = 12 + 8 + len(text) + 8 + len(body)
-    return b"".join(
-        [
-            struct.pack("<4sII", b"glTF", 2, size),
-            struct.pack("<I4s", len(text), b"JSON"),
-            text,
-            struct.pack("<I4s", len(body), b"BIN\0"),
-            body,
-        ]
-    )
+    return glb([(b"JSON", text), (b"BIN\0", bytes(buffer.data))])
 
 
 def make_web_gallery(options: WebGalleryOptions, note: Note = ignore) -> Iterator[File]:

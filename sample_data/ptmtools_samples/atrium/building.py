@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ptmtools_samples.atrium.sheets import Sheet, Vector, box, plane, revolved, smooth
+from ptmtools_samples.atrium.sheets import Sheet, Vector, box, plane, revolve, smooth
 
 #: Metres: the hall, the width of the walks around the court, the thickness of an arcade's wall.
 LENGTH, WIDTH, HEIGHT, WALK, WALL = 31.0, 16.6, 11.2, 3.6, 0.5
@@ -39,7 +39,7 @@ class Side:
     bay: float
     bays: int
 
-    def at(self, s: float, y: float, t: float) -> Vector:
+    def point(self, s: float, y: float, t: float) -> Vector:
         """The point ``s`` along the side, ``y`` up, ``t`` into the court, metres."""
         return (
             self.start[0] + s * self.along[0] + t * self.inward[0],
@@ -101,7 +101,7 @@ def arcades() -> Iterator[Sheet]:
         yield plane(
             f"{side.name}_edge",
             "cornice",
-            side.at(length, low, WALL / 2),
+            side.point(length, low, WALL / 2),
             (-right[0], -right[1], -right[2]),
             (0, high - low, 0),
             0.8,
@@ -130,8 +130,8 @@ def _bay(side: Side, level: int, storey: tuple[float, float, float], k: int) -> 
     s = np.concatenate([s, [side.bay - PIER, side.bay]])
     y = np.concatenate([[spring, spring], spring + radius * np.sin(angle[1:-1]), [spring, spring]])
     for face, t in (("front", WALL / 2), ("back", -WALL / 2)):
-        low = [side.at(k * side.bay + a, b, t) for a, b in zip(s, y, strict=True)]
-        high = [side.at(k * side.bay + a, top, t) for a in s]
+        low = [side.point(k * side.bay + a, b, t) for a, b in zip(s, y, strict=True)]
+        high = [side.point(k * side.bay + a, top, t) for a in s]
         points = np.array([low, high])
         uv = np.stack([np.broadcast_to(s / 3.0, (2, len(s))), points[:, :, 1] / 3.0], axis=2)
         if face == "front":
@@ -139,7 +139,7 @@ def _bay(side: Side, level: int, storey: tuple[float, float, float], k: int) -> 
         yield Sheet(name, "ashlar", points, uv)
     along = np.concatenate([[0], np.cumsum(np.hypot(np.diff(s), np.diff(y)))])
     soffit = [
-        [side.at(k * side.bay + a, b, t) for a, b in zip(s, y, strict=True)]
+        [side.point(k * side.bay + a, b, t) for a, b in zip(s, y, strict=True)]
         for t in (-WALL / 2, WALL / 2)
     ]
     uv = np.stack([np.broadcast_to(along, (2, len(s))), np.repeat([[0.0], [WALL]], len(s), 1)], 2)
@@ -159,7 +159,7 @@ def _moulding(
     points = np.array(
         [
             [
-                side.at(
+                side.point(
                     k * side.bay + side.bay / 2 - (radius + thick * math.cos(b)) * math.cos(a),
                     spring + (radius + thick * math.cos(b)) * math.sin(a),
                     t + thick * math.sin(b),
@@ -177,7 +177,7 @@ def _moulding(
 def _column(side: Side, level: int, storey: tuple[float, float, float], k: int) -> Iterator[Sheet]:
     name = f"{side.name}_{level}_column_{k}"
     floor, spring, _ = storey
-    foot = side.at(k * side.bay, floor, 0.0)
+    foot = side.point(k * side.bay, floor, 0.0)
     tall = spring - floor
     half = SHAFT * 1.45
     for low, high in ((0.0, 0.14), (tall - 0.12, tall)):
@@ -189,14 +189,14 @@ def _column(side: Side, level: int, storey: tuple[float, float, float], k: int) 
             1.0,
         )
     base = [(1.35, 0.14), (1.4, 0.2), (1.25, 0.26), (1.12, 0.3), (1.2, 0.35), (1.02, 0.4)]
-    yield revolved(name, "marble", smooth([(SHAFT * r, h) for r, h in base], 2), 24, foot, 2)
+    yield revolve(name, "marble", smooth([(SHAFT * r, h) for r, h in base], 2), 24, foot, 2)
     shaft = [(SHAFT * (1 - 0.14 * t * t), 0.4 + t * (tall - 1.0)) for t in np.linspace(0, 1, 11)]
     flutes = 14
-    yield revolved(
+    yield revolve(
         name, ("granite", "marble")[level], shaft, 4 * flutes, foot, 2, flutes=flutes, depth=0.07
     )
     capital = [(0.88, 0.6), (1.0, 0.56), (0.92, 0.5), (0.95, 0.4), (1.15, 0.26), (1.4, 0.12)]
-    yield revolved(
+    yield revolve(
         name,
         "capital",
         smooth([(SHAFT * r, tall - h) for r, h in capital], 3),

@@ -18,7 +18,7 @@ from ptmtools_samples.atrium.building import (
     Side,
     sides,
 )
-from ptmtools_samples.atrium.sheets import Sheet, Vector, box, picture, plane, revolved, smooth
+from ptmtools_samples.atrium.sheets import Sheet, Vector, box, picture, plane, revolve, smooth
 
 DRAPES = ("drape_red", "drape_green", "drape_blue")
 #: Metres.
@@ -51,7 +51,7 @@ def _drape(
     points = np.array(
         [
             [
-                side.at(
+                side.point(
                     (k + 0.5) * side.bay + float(across[i, j]),
                     low + tall * float(v[i]) - float(sag[i, j]),
                     WALL / 2 + 0.28 + float(out[i, j]),
@@ -79,9 +79,9 @@ def balustrades() -> Iterator[Sheet]:
             count = 8
             for n in range(count):
                 s = (k + 0.16 + 0.68 * (n + 0.5) / count) * side.bay
-                yield revolved(name, "stone", profile, 10, side.at(s, floor, 0.0), 1)
-            a = side.at((k + 0.12) * side.bay, floor + RAIL - 0.14, -0.11)
-            b = side.at((k + 0.88) * side.bay, floor + RAIL, 0.11)
+                yield revolve(name, "stone", profile, 10, side.point(s, floor, 0.0), 1)
+            a = side.point((k + 0.12) * side.bay, floor + RAIL - 0.14, -0.11)
+            b = side.point((k + 0.88) * side.bay, floor + RAIL, 0.11)
             low = min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])
             high = max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])
             yield from box(name, "stone", low, high, 1.0)
@@ -99,7 +99,7 @@ def vases() -> Iterator[Sheet]:
             yield from box(
                 name, "marble", (x - half, 0, z - half), (x + half, tall, z + half), 1.0, "xXYzZ"
             )
-            yield revolved(
+            yield revolve(
                 name, ("vase_blue", "vase_clay")[n % 2], smooth(profile, 3), 44, (x, tall, z), 1
             )
 

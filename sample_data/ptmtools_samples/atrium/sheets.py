@@ -73,7 +73,7 @@ def box(
     return [plane(name, material, *faces[side], tile) for side in sides]
 
 
-def revolved(
+def revolve(
     name: str,
     material: str,
     profile: Sequence[tuple[float, float]],

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ptmtools_samples.noise import Color, Field, axes, blend, fractal, ramp, step, wave
-from ptmtools_samples.surfaces import SURFACES, Surface, speckled
+from ptmtools_samples.surfaces import SURFACES, Surface, speckle
 
 #: Dark and light of each drape.
 DRAPES = {
@@ -22,14 +22,16 @@ DRAPES = {
 }
 
 
-def _grained(rng: np.random.Generator, size: int, dark: Color, light: Color, grain: float) -> Field:
+def _grain_stone(
+    rng: np.random.Generator, size: int, dark: Color, light: Color, grain: float
+) -> Field:
     """Stone without joints: clouds, and grains of a texel."""
     clouds = fractal(rng, size, 5, 5, 7, 0.62)
-    return ramp(clouds, (0.2, dark), (0.8, light)) + speckled(rng, size, grain)[..., None]
+    return ramp(clouds, (0.2, dark), (0.8, light)) + speckle(rng, size, grain)[..., None]
 
 
 def granite(rng: np.random.Generator, size: int) -> Field:
-    image = _grained(rng, size, (120, 84, 78), (168, 128, 116), 10)
+    image = _grain_stone(rng, size, (120, 84, 78), (168, 128, 116), 10)
     dark, light = (rng.random((size, size), dtype=np.float32) for _ in range(2))
     image = blend(image, (52, 44, 46), step(dark, 0.9, 1.0) * np.float32(0.7))
     return blend(image, (220, 196, 186), step(light, 0.93, 1.0) * np.float32(0.6))
@@ -53,7 +55,7 @@ def coffer(rng: np.random.Generator, size: int) -> Field:
 def cornice(rng: np.random.Generator, size: int) -> Field:
     """Carved leaves and eggs in turn, four to a metre, in bands."""
     x, y = axes(size)
-    image = _grained(rng, size, (176, 164, 142), (226, 216, 196), 6)
+    image = _grain_stone(rng, size, (176, 164, 142), (226, 216, 196), 6)
     eggs = wave(x * np.float32(4)) * wave(y * np.float32(2))
     image = blend(image, (96, 84, 66), step(eggs, 0.2, 0.5) * np.float32(0.6))
     image = blend(image, (246, 240, 224), step(eggs, 0.62, 0.9) * np.float32(0.7))
@@ -73,14 +75,14 @@ def drape(rng: np.random.Generator, size: int, dark: Color, light: Color) -> Fie
     image = blend(image, light, step(np.asarray(stripe), 0.2, 0.3) * np.float32(0.5))
     image = blend(image, (214, 182, 104), step(flower, 0.66, 0.74) * np.float32(0.75))
     thread = wave(x * np.float32(size // 4)) + wave(y * np.float32(size // 4))
-    return np.asarray(image + thread[..., None] * np.float32(6) + speckled(rng, size, 8)[..., None])
+    return np.asarray(image + thread[..., None] * np.float32(6) + speckle(rng, size, 8)[..., None])
 
 
 def vase(rng: np.random.Generator, size: int, ground: Color, paint: Color) -> Field:
     """Bands of meanders and flowers around a glazed vessel."""
     x, y = axes(size)
     red, green, blue = (min(c + 26, 255) for c in ground)
-    image = _grained(rng, size, ground, (red, green, blue), 3)
+    image = _grain_stone(rng, size, ground, (red, green, blue), 3)
     band = np.floor(y * np.float32(8))
     meander = wave(x * np.float32(16)) * np.float32(0.25) + (y * np.float32(8) - band)
     lines = step(np.abs(np.asarray(meander) - np.float32(0.5)), 0.1, 0.14)
@@ -97,33 +99,33 @@ def relief(rng: np.random.Generator, size: int) -> Field:
     """Weathered sandstone, darker in the hollows of the disc."""
     x, y = axes(size)
     distance = np.sqrt((x * 2 - 1) ** 2 + (y * 2 - 1) ** 2).astype(np.float32)
-    image = _grained(rng, size, (172, 142, 102), (216, 188, 144), 12)
+    image = _grain_stone(rng, size, (172, 142, 102), (216, 188, 144), 12)
     hollow = wave(distance * np.float32(4)) * np.float32(0.5) + np.float32(0.5)
     return blend(image, (98, 74, 50), hollow * np.float32(0.45))
 
 
 def stone(rng: np.random.Generator, size: int) -> Field:
-    return _grained(rng, size, (188, 178, 158), (224, 216, 198), 8)
+    return _grain_stone(rng, size, (188, 178, 158), (224, 216, 198), 8)
 
 
-def _shared(name: str) -> Surface:
+def _shared_surface(name: str) -> Surface:
     return SURFACES[name]
 
 
 TEXTURES: dict[str, Callable[[np.random.Generator, int], Field]] = {
-    "floor": _shared("stone"),
+    "floor": _shared_surface("stone"),
     "coffer": coffer,
-    "ashlar": _shared("facade"),
-    "parquet": _shared("parquet"),
-    "vault": _shared("plaster_cream"),
+    "ashlar": _shared_surface("facade"),
+    "parquet": _shared_surface("parquet"),
+    "vault": _shared_surface("plaster_cream"),
     "cornice": cornice,
     "stone": stone,
-    "marble": _shared("marble"),
+    "marble": _shared_surface("marble"),
     "granite": granite,
-    "capital": _shared("gilt"),
+    "capital": _shared_surface("gilt"),
     "vase_blue": partial(vase, ground=(214, 218, 224), paint=(34, 58, 138)),
     "vase_clay": partial(vase, ground=(178, 94, 52), paint=(38, 26, 24)),
     "relief": relief,
-    "carpet": _shared("carpet"),
+    "carpet": _shared_surface("carpet"),
     **{name: partial(drape, dark=dark, light=light) for name, (dark, light) in DRAPES.items()},
 }

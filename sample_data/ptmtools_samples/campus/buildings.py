@@ -16,10 +16,10 @@ from ptmtools_samples.campus.solids import (
     Ring,
     Wall,
     box,
-    extruded,
+    extrude,
     lid,
     prism,
-    swept,
+    sweep,
     walls_of,
 )
 from ptmtools_samples.mesh import Face
@@ -67,20 +67,20 @@ def build(recipe: Recipe, rng: np.random.Generator) -> StreetBuilding:
     elif kind in ("gable", "barrel", "gable_front"):
         end = walls[0] if kind == "gable_front" else walls[1]
         length = depth if kind == "gable_front" else width
-        faces += roofs.spanned(end, length, tops[0 if kind == "gable_front" else 1], surface)
+        faces += roofs.span(end, length, tops[0 if kind == "gable_front" else 1], surface)
         run, rise = depth / 2, depth / 2 * recipe.pitch
     else:
         run = 1.8 if kind == "mansard" else _wing(rings) / 2 - 0.45
         rise = 3.2 if kind == "mansard" else run * recipe.pitch
         crown = "roof_zinc" if kind == "mansard" else surface
-        faces += roofs.sloped(rings, look.top, run, rise, surface, crown)
+        faces += roofs.slope(rings, look.top, run, rise, surface, crown)
         for r in rings:
             gutter = [(-0.02, 0.18), (0.35, 0.02), (0.47, 0.0), (0.5, 0.16), (-0.02, 0.32)]
             profile = [(d, look.top - 0.2 + y) for d, y in gutter]
-            faces += swept(r, profile, "metal_dark", closed=True)
+            faces += sweep(r, profile, "metal_dark", closed=True)
     faces += _entrance(recipe, walls, bays)
-    faces += _dressed(recipe, rings, bays)
-    faces += _above(recipe, rings, run, rise, rng)
+    faces += _dress(recipe, rings, bays)
+    faces += _roof_attachments(recipe, rings, run, rise, rng)
     return StreetBuilding(faces, rings)
 
 
@@ -134,7 +134,7 @@ def _column(
     sides: int,
     material: str,
 ) -> list[Face]:
-    x, _, z = wall.at(u, 0, d)
+    x, _, z = wall.point(u, 0, d)
     if radius < 0.15:
         return prism((x, z), [(radius, low), (radius, high)], sides, material)
     r = radius
@@ -186,7 +186,7 @@ def _portico(recipe: Recipe, wall: Wall, middle: float, wide: float, out: float)
     return faces
 
 
-def _dressed(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
+def _dress(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
     """Adds attachments before the walls."""
     look, extras, faces = recipe.look, recipe.extras, []
     top = look.top
@@ -202,7 +202,7 @@ def _dressed(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
                 faces += roofs.course(ring, y - 0.02, trim)
         if "eaves" in extras:
             profile = [(-0.02, top - 0.42), (1.6, top - 0.42), (1.6, top - 0.1), (-0.02, top - 0.1)]
-            faces += swept(ring, profile, "metal", closed=True)
+            faces += sweep(ring, profile, "metal", closed=True)
         if "pilasters" in extras or "pilasters_brick" in extras:
             trim = "stone_trim" if "pilasters" in extras else look.wall
             faces += pilasters(walls_of(ring), look, trim, top - 0.74)
@@ -218,7 +218,7 @@ def _dressed(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
                     (0.8, 5.4),
                     (-0.02, 7.0),
                 ]
-                faces += extruded(wall, profile, u - 0.3, u + 0.3, "sandstone_red")
+                faces += extrude(wall, profile, u - 0.3, u + 0.3, "sandstone_red")
     first = [b for b in bays if b.wall.start[1] > -3 and b.wall.right[0] > 0]
     for bay in bays:
         if bay.kind == "balcony":
@@ -230,7 +230,7 @@ def _dressed(recipe: Recipe, rings: list[Ring], bays: list[Bay]) -> list[Face]:
     return faces
 
 
-def _above(
+def _roof_attachments(
     recipe: Recipe, rings: list[Ring], run: float, rise: float, rng: np.random.Generator
 ) -> list[Face]:
     """Adds attachments on the roof."""
@@ -311,7 +311,7 @@ def _belfry(material: str, top: float) -> list[Face]:
     ring = [(-1.5, -1.2), (1.5, -1.2), (1.5, -4.2), (-1.5, -4.2)]
     faces += roofs.cornice(ring, base + 8, "sandstone_red", 0.3, 0.4)
     spire = [(0.25, base + 7.95), (0.25, base + 8.05), (-1.42, base + 14)]
-    faces += swept(ring, spire, "roof_copper", closed=False)
+    faces += sweep(ring, spire, "roof_copper", closed=False)
     at = [(-1.75, -0.95), (1.75, -0.95), (1.75, -4.45), (-1.75, -4.45)]
     faces += lid([at], base + 7.95, "roof_copper", up=False)
     tip = [(-0.08, -2.62), (0.08, -2.62), (0.08, -2.78), (-0.08, -2.78)]

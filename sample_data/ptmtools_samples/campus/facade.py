@@ -10,14 +10,14 @@ import numpy as np
 from ptmtools_samples.campus.openings import (
     Hole,
     Style,
-    arched,
+    arch,
     cells,
     door,
     dressing,
-    glazed,
-    within,
+    glaze,
+    grid_lines,
 )
-from ptmtools_samples.campus.solids import Flat, Ring, Wall, box, walls_of, zipped
+from ptmtools_samples.campus.solids import Flat, Ring, Wall, box, walls_of, zip_strip
 from ptmtools_samples.mesh import Face, Point
 
 
@@ -134,26 +134,26 @@ def facades(
             floor: list[Point] = [(0, 0, 0), (wall.length, 0, 0)]
             level = [(0.0, look.top), (wall.length, look.top)]
             edge: list[Point] = [(u, v, 0) for u, v in tops.get(number, level)]
-            faces += [wall.face(look.ground, p) for p in zipped(floor, low)]
-            faces += [wall.face(look.wall, p) for p in zipped(high, edge)]
+            faces += [wall.face(look.ground, p) for p in zip_strip(floor, low)]
+            faces += [wall.face(look.wall, p) for p in zip_strip(high, edge)]
             for bay in actual:
-                faces += _filled(bay, us, cuts, look, rng)
+                faces += _fill(bay, us, cuts, look, rng)
             bays += actual
     return faces, bays
 
 
-def _filled(
+def _fill(
     bay: Bay, us: list[float], cuts: list[float], look: FacadeLook, rng: np.random.Generator
 ) -> list[Face]:
     wall, hole = bay.wall, bay.hole
-    a, b = within(hole[0], hole[2], us), within(hole[1], hole[3], cuts)
+    a, b = grid_lines(hole[0], hole[2], us), grid_lines(hole[1], hole[3], cuts)
     style = look.style if bay.storey else look.ground_style
     glass = style.glass[int(rng.integers(len(style.glass)))]
     if bay.kind == "door":
         return door(wall, hole, a, b, look.door, style.frame, look.reveals)
     if bay.kind == "balcony":
         style = replace(style, panes=(2, 1), arched=False)
-    build = arched if style.arched else glazed
+    build = arch if style.arched else glaze
     faces = build(wall, hole, a, b, style, glass, look.reveals)
     return faces + dressing(wall, hole, style, sill=bay.kind == "window")
 

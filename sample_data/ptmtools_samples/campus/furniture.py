@@ -114,7 +114,7 @@ class _Placer:
     def put(self, kind: str, frame: PlotFrame, faces: list[Face], suffix: str = "") -> None:
         self.counts[kind] = self.counts.get(kind, 0) + 1
         name = f"{kind}_{self.counts[kind]:03d}{suffix}"
-        self.things.append(Thing(name, frame.placed(faces)))
+        self.things.append(Thing(name, frame.place(faces)))
 
 
 def furnish(

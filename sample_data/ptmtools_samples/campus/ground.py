@@ -14,7 +14,7 @@ from ptmtools_samples.campus.layout import (
 )
 from ptmtools_samples.campus.materials import MATERIALS
 from ptmtools_samples.campus.solids import Flat
-from ptmtools_samples.mesh import Face, Point, Thing, tiled
+from ptmtools_samples.mesh import Face, Point, Thing, tile_face
 
 #: Shares of a plot's frontage: a lane, garden, the path to the door, garden, a margin.
 COLUMNS = (0.0, 0.06, 0.42, 0.58, 0.94, 1.0)
@@ -43,7 +43,7 @@ def garden(plot: Plot, plots: int) -> tuple[str, str]:
 
 
 def _flat(material: str, corners: list[Flat], y: float) -> Face:
-    return tiled(material, tuple((x, y, z) for x, z in corners), MATERIALS[material].tile)
+    return tile_face(material, tuple((x, y, z) for x, z in corners), MATERIALS[material].tile)
 
 
 def _patch(
@@ -51,10 +51,10 @@ def _patch(
 ) -> list[Flat]:
     a, b = min(t), max(t)
     return [
-        street.mitred(segment, f[0], b),
-        street.mitred(segment, f[1], b),
-        street.mitred(segment, f[1], a),
-        street.mitred(segment, f[0], a),
+        street.mitre_point(segment, f[0], b),
+        street.mitre_point(segment, f[1], b),
+        street.mitre_point(segment, f[1], a),
+        street.mitre_point(segment, f[0], a),
     ]
 
 
@@ -101,7 +101,7 @@ def make_ground(street: Street) -> list[Thing]:
 
                     road.faces.append(strip(0, KERB, "asphalt", 0))
                     walks.faces.append(strip(KERB, PAVEMENT, "asphalt" if lane else "paving"))
-                    ends = [street.mitred(segment, x, side * KERB) for x in f]
+                    ends = [street.mitre_point(segment, x, side * KERB) for x in f]
                     walks.faces.append(_kerb(ends[0], ends[1], side))
                     front = path if c == 2 and plot.number >= 0 else cover
                     lawn.faces.append(strip(PAVEMENT, GARDEN, "asphalt" if lane else front))
@@ -120,7 +120,7 @@ def _ends(street: Street) -> Thing:
         hx, hz = street.headings[segment]
 
         def point(t: float, out: float) -> Flat:
-            x, z = street.mitred(segment, near, t)  # noqa: B023
+            x, z = street.mitre_point(segment, near, t)  # noqa: B023
             return x + hx * out, z + hz * out  # noqa: B023
 
         for side in (1, -1):

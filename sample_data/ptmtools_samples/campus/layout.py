@@ -31,12 +31,12 @@ class PlotFrame:
     right: Flat
     out: Flat
 
-    def at(self, p: Point) -> Point:
+    def point(self, p: Point) -> Point:
         (x, y, z), (rx, rz), (ox, oz) = self.origin, self.right, self.out
         return x + rx * p[0] + ox * p[2], y + p[1], z + rz * p[0] + oz * p[2]
 
-    def placed(self, faces: list[Face]) -> list[Face]:
-        return [Face(f.material, tuple(self.at(p) for p in f.points), f.uv) for f in faces]
+    def place(self, faces: list[Face]) -> list[Face]:
+        return [Face(f.material, tuple(self.point(p) for p in f.points), f.uv) for f in faces]
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Street:
                         self.plots.append(Plot(len(self.plots), segment, slot, side, low, high))
                 slot += 1
 
-    def across(self, node: int) -> Flat:
+    def mitre(self, node: int) -> Flat:
         """Displacement of the cross-section at a node per metre of t: the mitre of two segments."""
         a = self.headings[max(node - 1, 0)]
         b = self.headings[min(node, len(self.headings) - 1)]
@@ -91,10 +91,10 @@ class Street:
         share = 1 + ax * bx + az * bz
         return (ax + bx) / share, (az + bz) / share
 
-    def mitred(self, segment: int, f: float, t: float) -> Flat:
+    def mitre_point(self, segment: int, f: float, t: float) -> Flat:
         """The point at a share f of a segment, between its mitred ends."""
         (x, z), (X, Z) = self.nodes[segment : segment + 2]
-        (p, q), (P, Q) = self.across(segment), self.across(segment + 1)
+        (p, q), (P, Q) = self.mitre(segment), self.mitre(segment + 1)
         a, b = (x + p * t, z + q * t), (X + P * t, Z + Q * t)
         return a[0] + (b[0] - a[0]) * f, a[1] + (b[1] - a[1]) * f
 
@@ -112,7 +112,7 @@ class Street:
         return [first, *self.nodes, last]
 
 
-def along(line: list[Flat], s: float) -> Flat:
+def point_along(line: list[Flat], s: float) -> Flat:
     """The point of a polyline at s metres from its start."""
     for (x, z), (X, Z) in pairwise(line):
         length = ((X - x) * (X - x) + (Z - z) * (Z - z)) ** 0.5

@@ -15,15 +15,15 @@ from ptmtools_samples.noise import (
     ramp,
     step,
     value_noise,
-    warped,
+    warp,
     wave,
 )
-from ptmtools_samples.surfaces import speckled
+from ptmtools_samples.surfaces import speckle
 
 Surface = Callable[[np.random.Generator, int], Field]
 
 
-def shaded(color: Color, factor: float) -> Color:
+def shade(color: Color, factor: float) -> Color:
     return color[0] * factor, color[1] * factor, color[2] * factor
 
 
@@ -65,7 +65,7 @@ def bricks(dark: Color, middle: Color, light: Color, mortar: Color) -> Surface:
         image = ramp(t, (0.05, dark), (0.5, middle), (0.95, light))
         image = image * (np.float32(0.9) + weather * np.float32(0.2))[..., None]
         image = blend(image, mortar, gap * np.float32(0.9))
-        return image + speckled(rng, size, 8)[..., None]
+        return image + speckle(rng, size, 8)[..., None]
 
     return draw
 
@@ -82,8 +82,8 @@ def ashlar(dark: Color, light: Color, rows: int, blocks: int, *, rustic: bool = 
         if rustic:
             light_from_above = np.float32(1.1) - height * np.float32(0.22)
             image = image * light_from_above[..., None]
-        image = blend(image, shaded(dark, 0.6), gap * np.float32(0.95 if rustic else 0.7))
-        return image + speckled(rng, size, 5)[..., None]
+        image = blend(image, shade(dark, 0.6), gap * np.float32(0.95 if rustic else 0.7))
+        return image + speckle(rng, size, 5)[..., None]
 
     return draw
 
@@ -100,7 +100,7 @@ def rubble(rng: np.random.Generator, size: int) -> Field:
         (1.0, (128, 126, 124)),
     )
     image = image * (np.float32(0.72) + rough * np.float32(0.52))[..., None]
-    return blend(image, (188, 180, 164), gap) + speckled(rng, size, 7)[..., None]
+    return blend(image, (188, 180, 164), gap) + speckle(rng, size, 7)[..., None]
 
 
 def plaster(color: Color) -> Surface:
@@ -111,8 +111,8 @@ def plaster(color: Color) -> Surface:
         clouds = fractal(rng, size, 4, 3, 5)
         runs = fractal(rng, size, 40, 2, 2)
         t = fine * np.float32(0.5) + clouds * np.float32(0.35) + runs * np.float32(0.15)
-        image = ramp(t, (0.25, shaded(color, 0.9)), (0.75, shaded(color, 1.05)))
-        return image + speckled(rng, size, 5)[..., None]
+        image = ramp(t, (0.25, shade(color, 0.9)), (0.75, shade(color, 1.05)))
+        return image + speckle(rng, size, 5)[..., None]
 
     return draw
 
@@ -174,12 +174,12 @@ def boards(colors: tuple[Color, Color, Color]) -> Surface:
         )
         image = ramp(t, (0.1, colors[0]), (0.5, colors[1]), (0.95, colors[2]))
         joint = step(np.abs(x * np.float32(n) - i - np.float32(0.5)), 0.45, 0.49)
-        return blend(image, shaded(colors[0], 0.45), joint + np.zeros_like(t))
+        return blend(image, shade(colors[0], 0.45), joint + np.zeros_like(t))
 
     return draw
 
 
-def ribbed(color: Color, ribs: int, *, seams: bool) -> Surface:
+def rib_sheet(color: Color, ribs: int, *, seams: bool) -> Surface:
     """Sheet metal: corrugated, or flat with standing ``seams``."""
 
     def draw(rng: np.random.Generator, size: int) -> Field:
@@ -193,9 +193,9 @@ def ribbed(color: Color, ribs: int, *, seams: bool) -> Surface:
             light = light * np.float32(0.25)
         else:
             light = wave(t) * np.float32(0.22)
-        image = ramp(tone, (0.25, shaded(color, 0.84)), (0.75, shaded(color, 1.1)))
+        image = ramp(tone, (0.25, shade(color, 0.84)), (0.75, shade(color, 1.1)))
         image = image * (np.float32(1) + light + np.zeros_like(tone))[..., None]
-        return image + speckled(rng, size, 3)[..., None]
+        return image + speckle(rng, size, 3)[..., None]
 
     return draw
 
@@ -216,7 +216,7 @@ def terracotta(rng: np.random.Generator, size: int) -> Field:
     rib = wave(y * np.float32(ny * 4)) * np.float32(0.07)
     image = image * (np.float32(1) + rib + np.zeros_like(tone))[..., None]
     edge = np.maximum(np.abs(fx - np.float32(0.5)) * np.float32(1.0), np.abs(fy - np.float32(0.5)))
-    return blend(image, (66, 42, 34), step(edge, 0.475, 0.495)) + speckled(rng, size, 4)[..., None]
+    return blend(image, (66, 42, 34), step(edge, 0.475, 0.495)) + speckle(rng, size, 4)[..., None]
 
 
 def roof_tiles(rng: np.random.Generator, size: int) -> Field:
@@ -248,7 +248,7 @@ def roof_tiles(rng: np.random.Generator, size: int) -> Field:
     shadow = np.where(above, np.float32(0), np.float32(1) - step(depth, 0.0, 0.22))
     image = blend(image, (52, 26, 20), shadow * np.float32(0.75))
     side = step(np.abs(gx), 0.45, 0.5) * np.float32(0.6)
-    return blend(image, (64, 32, 24), side) + speckled(rng, size, 5)[..., None]
+    return blend(image, (64, 32, 24), side) + speckle(rng, size, 5)[..., None]
 
 
 def roof_slate(rng: np.random.Generator, size: int) -> Field:
@@ -257,20 +257,20 @@ def roof_slate(rng: np.random.Generator, size: int) -> Field:
     t = tone * np.float32(0.65) + rough * np.float32(0.35)
     image = ramp(t, (0.1, (66, 70, 80)), (0.5, (88, 93, 103)), (0.95, (118, 122, 130)))
     image = image * (np.float32(0.82) + height * np.float32(0.26))[..., None]
-    return blend(image, (36, 38, 44), gap * np.float32(0.9)) + speckled(rng, size, 4)[..., None]
+    return blend(image, (36, 38, 44), gap * np.float32(0.9)) + speckle(rng, size, 4)[..., None]
 
 
 def stone_trim(rng: np.random.Generator, size: int) -> Field:
     fine, clouds = fractal(rng, size, 24, 24, 5, 0.65), fractal(rng, size, 4, 4, 4)
     t = fine * np.float32(0.55) + clouds * np.float32(0.45)
     image = ramp(t, (0.25, (178, 170, 152)), (0.75, (214, 207, 190)))
-    return image + speckled(rng, size, 6)[..., None]
+    return image + speckle(rng, size, 6)[..., None]
 
 
 def stone_polished(rng: np.random.Generator, size: int) -> Field:
     """Granite with veins."""
     a, b = (fractal(rng, size, 4, 4, 5) - np.float32(0.5) for _ in range(2))
-    field = warped(fractal(rng, size, 3, 3, 6), a * np.float32(0.5), b * np.float32(0.5))
+    field = warp(fractal(rng, size, 3, 3, 6), a * np.float32(0.5), b * np.float32(0.5))
     crystals = value_noise(rng, size, max(8, size // 4), max(8, size // 4))
     vein = np.float32(1) - np.abs(field - np.float32(0.5)) * np.float32(2)
     image = ramp(
@@ -296,12 +296,12 @@ WALLS_AND_ROOFS: dict[str, Surface] = {
     "plaster_rose": plaster((206, 148, 128)),
     "concrete": concrete,
     "concrete_panel": concrete_panel,
-    "cladding_metal": ribbed((142, 154, 168), 20, seams=False),
+    "cladding_metal": rib_sheet((142, 154, 168), 20, seams=False),
     "cladding_timber": boards(((118, 78, 44), (164, 118, 72), (196, 154, 106))),
     "cladding_terracotta": terracotta,
     "stone_trim": stone_trim,
     "stone_polished": stone_polished,
     "roof_tiles": roof_tiles,
     "roof_slate": roof_slate,
-    "roof_copper": ribbed((124, 166, 146), 6, seams=True),
+    "roof_copper": rib_sheet((124, 166, 146), 6, seams=True),
 }

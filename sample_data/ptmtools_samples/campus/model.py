@@ -33,7 +33,7 @@ from ptmtools_samples.options import StreetOptions
 RECIPES = [*HETEROGENEOUS, *MIXED, *(residence(k) for k in range(14))]
 
 
-def chosen(buildings: int) -> list[Recipe]:
+def choose_recipes(buildings: int) -> list[Recipe]:
     """Selects a recipe for each building; small numbers are spread over the whole list."""
     return [RECIPES[k * len(RECIPES) // buildings] for k in range(buildings)]
 
@@ -42,7 +42,7 @@ def make_things(options: StreetOptions) -> tuple[list[Thing], Street, tuple[floa
     """Returns all objects in world coordinates, the street, and the (x, z) offset that centres
     them."""
     street = Street(options.buildings, options.length)
-    recipes = chosen(options.buildings)
+    recipes = choose_recipes(options.buildings)
     things: list[Thing] = make_ground(street)
     depths = []
     for plot, recipe in zip(street.plots, recipes, strict=True):
@@ -51,7 +51,7 @@ def make_things(options: StreetOptions) -> tuple[list[Thing], Street, tuple[floa
         middle = (plot.low + plot.high) / 2 * street.segment_length
         back = FRONT + (plot.number * 7 % 5) * 0.8
         frame = street.frame(plot.segment, middle, plot.side * back, CURB_HEIGHT - 0.02, plot.side)
-        faces = sorted(frame.placed(built.faces), key=lambda f: f.material)
+        faces = sorted(frame.place(built.faces), key=lambda f: f.material)
         things.append(Thing(f"building_{plot.number + 1:02d}_{recipe.name}", faces))
     things += furnish(street, recipes, depths, generator(options.seed, 2))
     xs, zs = ([p[i] for t in things for f in t.faces for p in f.points] for i in (0, 2))
@@ -65,7 +65,7 @@ def make_things(options: StreetOptions) -> tuple[list[Thing], Street, tuple[floa
     return things, street, (x, z)
 
 
-def used(things: list[Thing]) -> dict[str, StreetMaterial]:
+def used_materials(things: list[Thing]) -> dict[str, StreetMaterial]:
     names = {face.material for thing in things for face in thing.faces}
     return {name: material for name, material in MATERIALS.items() if name in names}
 
@@ -92,11 +92,11 @@ def pictures(materials: dict[str, StreetMaterial], options: StreetOptions) -> It
     masked = {m.image for m in materials.values() if m.mask}
     clear = {m.image for m in materials.values() if m.alpha}
 
-    def lettered() -> bytes:
-        labels = [recipe.label for recipe in chosen(options.buildings)]
+    def draw_signs() -> bytes:
+        labels = [recipe.label for recipe in choose_recipes(options.buildings)]
         return png(signs(labels)(generator(seed, 6), size))
 
-    def drawn(name: str) -> Callable[[], bytes]:
+    def draw_later(name: str) -> Callable[[], bytes]:
         def load() -> bytes:
             field = IMAGES[name](generator(seed, 3, streams[name]), size)
             return png(Image.fromarray(bytes_of(field)))
@@ -121,9 +121,9 @@ def pictures(materials: dict[str, StreetMaterial], options: StreetOptions) -> It
 
     for name in dict.fromkeys(m.image for m in materials.values()):
         if name == "signs":
-            yield f"textures/{name}.png", lettered
+            yield f"textures/{name}.png", draw_signs
             continue
-        yield f"textures/{name}.png", drawn(name)
+        yield f"textures/{name}.png", draw_later(name)
         if name in masked:
             yield f"textures/{name}_mask.png", reflecting(name)
         if name in clear:
@@ -137,7 +137,7 @@ def make_campus(options: StreetOptions, note: Note = ignore) -> Iterator[File]:
     Raises InputError: PTM-I111 the buildings do not fit along the street.
     """
     things, street, centre = make_things(options)
-    materials = used(things)
+    materials = used_materials(things)
     images = list(pictures(materials, options))
     triangles = sum(len(f.points) - 2 for t in things for f in t.faces)
     head = [

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from ptmtools_samples.campus.solids import Wall, box, extruded, zipped
+from ptmtools_samples.campus.solids import Wall, box, extrude, zip_strip
 from ptmtools_samples.mesh import Face, Point
 
 Hole = tuple[float, float, float, float]  # low u, low v, high u, high v
@@ -59,7 +59,7 @@ def cells(
     return faces
 
 
-def around(us: Sequence[float], vs: Sequence[float], d: float) -> list[list[Point]]:
+def rectangle_sides(us: Sequence[float], vs: Sequence[float], d: float) -> list[list[Point]]:
     """Returns the four sides of a rectangle with its grid points, counter-clockwise from below."""
     (u, *_, U), (v, *_, V) = us, vs
     return [
@@ -77,11 +77,11 @@ def reveal(
     return [
         wall.face(material, piece)
         for a, b in zip(front, back, strict=True)
-        for piece in zipped(a, b)
+        for piece in zip_strip(a, b)
     ]
 
 
-def within(low: float, high: float, cuts: Sequence[float]) -> list[float]:
+def grid_lines(low: float, high: float, cuts: Sequence[float]) -> list[float]:
     """Returns the grid lines of a wall between two of them, inclusive."""
     return [c for c in cuts if low - 1e-9 <= c <= high + 1e-9]
 
@@ -94,7 +94,7 @@ def _pane(wall: Wall, material: str, hole: Hole, pane: Hole, d: float) -> Face:
     return wall.face(material, [(u, v, d), (U, v, d), (U, V, d), (u, V, d)], uv)
 
 
-def glazed(
+def glaze(
     wall: Wall,
     hole: Hole,
     us: Sequence[float],
@@ -127,11 +127,11 @@ def glazed(
         for j in range(up)
     ]
     d, deep = -style.depth, -style.depth - 0.05
-    faces = reveal(wall, reveals, around(us, vs, 0), around(columns, rows, d))
+    faces = reveal(wall, reveals, rectangle_sides(us, vs, 0), rectangle_sides(columns, rows, d))
     faces += cells(wall, style.frame, columns, rows, panes, d)
     for pane in panes:
         x, y = (pane[0], pane[2]), (pane[1], pane[3])
-        faces += reveal(wall, style.frame, around(x, y, d), around(x, y, deep))
+        faces += reveal(wall, style.frame, rectangle_sides(x, y, d), rectangle_sides(x, y, deep))
         faces.append(_pane(wall, glass, hole, pane, deep))
     return faces
 
@@ -159,7 +159,7 @@ def _arch(u: float, v: float, U: float, V: float, d: float) -> list[list[Point]]
     ]
 
 
-def arched(
+def arch(
     wall: Wall,
     hole: Hole,
     us: Sequence[float],
@@ -171,7 +171,7 @@ def arched(
     """A window with a round head; its surround, level with the wall, fills the rest of the hole."""
     u, v, U, V = hole
     m = 0.14
-    edge = around(us, vs, 0)
+    edge = rectangle_sides(us, vs, 0)
     arch = _arch(u + m, v + m, U - m, V - m, 0)
     deep_arch = _arch(u + m, v + m, U - m, V - m, -style.depth)
     bar = style.bar * 1.3
@@ -180,7 +180,7 @@ def arched(
     faces = [
         wall.face(style.trim, piece)
         for a, b in zip(edge, arch, strict=True)
-        for piece in zipped(a, b)
+        for piece in zip_strip(a, b)
     ]
     faces += reveal(wall, reveals, arch, deep_arch)
     faces += reveal(wall, style.frame, deep_arch, frame) + reveal(wall, style.frame, frame, deep)
@@ -209,7 +209,7 @@ def dressing(wall: Wall, hole: Hole, style: Style, *, sill: bool) -> list[Face]:
     trim, faces = style.trim, []
     if sill and style.sill:
         profile = [(-0.02, v - 0.1), (0.09, v - 0.1), (0.1, v - 0.02), (-0.02, v + 0.025)]
-        faces += extruded(wall, profile, u - 0.08, U + 0.08, trim)
+        faces += extrude(wall, profile, u - 0.08, U + 0.08, trim)
     if style.surround == "lintel":
         faces += box(wall, trim, (u - 0.15, V - 0.01, -0.02), (U + 0.15, V + 0.22, 0.04))
     if style.surround in ("frame", "pediment"):
@@ -224,7 +224,7 @@ def dressing(wall: Wall, hole: Hole, style: Style, *, sill: bool) -> list[Face]:
             (0.2, V + 0.42),
             (-0.02, V + 0.5),
         ]
-        faces += extruded(wall, top, u - 0.3, U + 0.3, trim)
+        faces += extrude(wall, top, u - 0.3, U + 0.3, trim)
     if style.surround == "keystone":
         middle = (u + U) / 2
         faces += box(wall, trim, (middle - 0.13, V - 0.2, -0.02), (middle + 0.13, V + 0.2, 0.09))
@@ -249,11 +249,11 @@ def door(
     rows = [v, v + 0.02, head, head + bar, V - bar, V]
     leaves = [(columns[k], rows[1], columns[k + 1], rows[2]) for k in (1, 3)]
     lights = [(columns[k], rows[3], columns[k + 1], rows[4]) for k in (1, 3)]
-    faces = reveal(wall, reveals, around(us, vs, 0), around(columns, rows, d))
+    faces = reveal(wall, reveals, rectangle_sides(us, vs, 0), rectangle_sides(columns, rows, d))
     faces += cells(wall, frame, columns, rows, [*leaves, *lights], d)
     for pane in (*leaves, *lights):
         x, y = (pane[0], pane[2]), (pane[1], pane[3])
-        faces += reveal(wall, frame, around(x, y, d), around(x, y, deep))
+        faces += reveal(wall, frame, rectangle_sides(x, y, d), rectangle_sides(x, y, deep))
         if pane in leaves:
             faces.append(_pane(wall, leaf, pane, pane, deep))
         else:
@@ -273,4 +273,4 @@ def plinth_steps(
         d = 1.3 + out + 0.32 * (count - 1 - k)
         profile += [(d, height * (k + 1) / count), (d - 0.32, height * (k + 1) / count)]
     profile[-1] = (-0.03, height)
-    return extruded(wall, profile, middle - width / 2, middle + width / 2, material)
+    return extrude(wall, profile, middle - width / 2, middle + width / 2, material)

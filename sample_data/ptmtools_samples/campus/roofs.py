@@ -12,11 +12,11 @@ from ptmtools_samples.campus.solids import (
     Ring,
     Wall,
     box,
-    extruded,
+    extrude,
     lid,
     offset,
     prism,
-    swept,
+    sweep,
     walls_of,
 )
 from ptmtools_samples.mesh import Face, Point
@@ -26,18 +26,18 @@ def flat(rings: list[Ring], top: float, coping: str, inside: str, surface: str) 
     """A parapet around a level roof 0.7 m below its top."""
     faces = []
     for ring in rings:
-        faces += swept(ring, [(0, top), (-0.35, top)], coping, closed=False)
-        faces += swept(ring, [(-0.35, top), (-0.35, top - 0.7)], inside, closed=False)
+        faces += sweep(ring, [(0, top), (-0.35, top)], coping, closed=False)
+        faces += sweep(ring, [(-0.35, top), (-0.35, top - 0.7)], inside, closed=False)
     return faces + lid([offset(r, -0.35) for r in rings], top - 0.7, surface)
 
 
-def sloped(
+def slope(
     rings: list[Ring], top: float, run: float, rise: float, surface: str, crown: str
 ) -> list[Face]:
     """Slopes up from every wall: a hipped roof, a mansard, a pyramid; the crown is level."""
     faces = []
     for ring in rings:
-        faces += swept(ring, [(0, top), (-run, top + rise)], surface, closed=False)
+        faces += sweep(ring, [(0, top), (-run, top + rise)], surface, closed=False)
     return faces + lid([offset(r, -run) for r in rings], top + rise, crown)
 
 
@@ -58,7 +58,7 @@ def barrel(width: float, rise: float, top: float, steps: int = 14) -> list[Flat]
     return edge
 
 
-def spanned(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Face]:
+def span(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Face]:
     """The roof between an end wall and the opposite wall at ``length``, and its eaves.
 
     ``edge``: the upper edge (u, v) of the end wall. The inner roof closes the walls; a thicker,
@@ -77,7 +77,12 @@ def spanned(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Fa
         ]
         faces.append(end.face(surface, quad, uv))
         slope_length += step
-    # The overhanging roof: the edge raised slightly and extended at both ends.
+    return faces + _overhang(end, length, edge, surface)
+
+
+def _overhang(end: Wall, length: float, edge: list[Flat], surface: str) -> list[Face]:
+    """The roof above: the edge raised slightly and extended at both ends."""
+    faces = []
     (u0, v0), (u1, v1) = edge[0], edge[1]
     share = 0.5 / math.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2)
     tip = (u0 - (u1 - u0) * share, v0 - (v1 - v0) * share)
@@ -133,7 +138,7 @@ def cornice(ring: Ring, y: float, material: str, out: float = 0.4, tall: float =
         (out, y - 0.04),
         (-0.02, y + 0.03),
     ]
-    return swept(ring, profile, material, closed=True)
+    return sweep(ring, profile, material, closed=True)
 
 
 def course(
@@ -146,7 +151,7 @@ def course(
         (out, y + tall / 4),
         (-0.02, y + tall / 2),
     ]
-    return swept(ring, profile, material, closed=True)
+    return sweep(ring, profile, material, closed=True)
 
 
 def dentils(ring: Ring, y: float, material: str, pitch: float = 0.6) -> list[Face]:
@@ -234,7 +239,7 @@ def equipment(x: float, z: float, y: float, kind: int, rng: np.random.Generator)
     if kind == 2:
         faces = box(wall, "metal", (0, y - 0.02, -2 * d), (2 * w, y + 0.3, 0))
         roof = [(-2 * d + 0.06, y + 0.29), (-0.06, y + 0.29), (-d, y + 0.29 + d * 0.6)]
-        return faces + extruded(wall, roof, 0.06, 2 * w - 0.06, "louvre")
+        return faces + extrude(wall, roof, 0.06, 2 * w - 0.06, "louvre")
     faces = box(wall, "plaster_grey", (0, y - 0.02, -2 * d), (2 * w, y + 2.6, 0))
     faces += box(wall, "metal", (-0.15, y + 2.59, -2 * d - 0.15), (2 * w + 0.15, y + 2.75, 0.15))
     return faces + box(wall, "metal_dark", (w - 0.5, y, -0.01), (w + 0.5, y + 2.1, 0.04))

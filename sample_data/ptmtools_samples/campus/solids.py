@@ -33,7 +33,7 @@ class Wall:
     right: Flat
     length: float
 
-    def at(self, u: float, v: float, d: float) -> Point:
+    def point(self, u: float, v: float, d: float) -> Point:
         (x, z), (rx, rz) = self.start, self.right
         return x + rx * u - rz * d, v, z + rz * u + rx * d
 
@@ -50,7 +50,7 @@ class Wall:
                 uv = [(u, d) for u, _, d in corners]
             else:
                 uv = [(u, v) for u, v, _ in corners]
-        return face(material, [self.at(*c) for c in corners], uv)
+        return face(material, [self.point(*c) for c in corners], uv)
 
 
 def walls_of(ring: Ring) -> list[Wall]:
@@ -61,7 +61,7 @@ def walls_of(ring: Ring) -> list[Wall]:
     return walls
 
 
-def zipped(a: Sequence[Point], b: Sequence[Point]) -> list[tuple[Point, ...]]:
+def zip_strip(a: Sequence[Point], b: Sequence[Point]) -> list[tuple[Point, ...]]:
     """Triangulates the strip between two polylines of the same direction, ``a`` below ``b``."""
 
     def shares(line: Sequence[Point]) -> list[float]:
@@ -114,7 +114,7 @@ def offset(ring: Ring, d: float) -> Ring:
     return out
 
 
-def swept(ring: Ring, profile: Sequence[Flat], material: str, *, closed: bool) -> list[Face]:
+def sweep(ring: Ring, profile: Sequence[Flat], material: str, *, closed: bool) -> list[Face]:
     """A profile of (d, y) swept around a ring; solid on its left, going up the outside.
 
     ``closed`` joins the end of the profile with its start, which gives a separate moulding.
@@ -185,7 +185,7 @@ def lid(rings: list[Ring], y: float, material: str, *, up: bool = True) -> list[
     return faces
 
 
-def extruded(wall: Wall, profile: Sequence[Flat], u: float, U: float, material: str) -> list[Face]:
+def extrude(wall: Wall, profile: Sequence[Flat], u: float, U: float, material: str) -> list[Face]:
     """A profile of (d, v), counter-clockwise as seen from the wall's left end (d to the right)."""
     faces = []
     along = 0.0
@@ -209,7 +209,7 @@ def prism(
     turns = [2 * math.pi * k / sides for k in range(sides)]
     unit = [(math.cos(t), -math.sin(t) * squeeze) for t in turns]
 
-    def at(k: int, r: float, y: float) -> Point:
+    def corner(k: int, r: float, y: float) -> Point:
         return centre[0] + r * unit[k % sides][0], y, centre[1] + r * unit[k % sides][1]
 
     faces = []
@@ -217,10 +217,10 @@ def prism(
     for (r, y), (R, Y) in pairwise(levels):
         v, V = (y, Y) if abs(Y - y) > 1e-9 else (r, R)
         for k in range(sides):
-            quad = [at(k, r, y), at(k + 1, r, y), at(k + 1, R, Y), at(k, R, Y)]
+            quad = [corner(k, r, y), corner(k + 1, r, y), corner(k + 1, R, Y), corner(k, R, Y)]
             uv = [(around * k, v), (around * (k + 1), v), (around * (k + 1), V), (around * k, V)]
             faces.append(face(material, quad, uv))
     for (r, y), order in ((levels[0], -1), (levels[-1], 1)):
-        corners = [at(k, r, y) for k in range(sides)][::order]
+        corners = [corner(k, r, y) for k in range(sides)][::order]
         faces.append(face(material, corners, [(p[0], -p[2]) for p in corners]))
     return faces

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 
-from ptmtools_samples.brush import lettered
-from ptmtools_samples.campus.masonry import WALLS_AND_ROOFS, Surface, courses, shaded
+from ptmtools_samples.brush import draw_letters
+from ptmtools_samples.campus.masonry import WALLS_AND_ROOFS, Surface, courses, shade
 from ptmtools_samples.noise import (
     Color,
     Field,
@@ -23,16 +23,16 @@ from ptmtools_samples.noise import (
     ramp,
     step,
     value_noise,
-    warped,
+    warp,
     wave,
 )
-from ptmtools_samples.surfaces import speckled
+from ptmtools_samples.surfaces import speckle
 
 
 def paint(rng: np.random.Generator, size: int) -> Field:
     t = fractal(rng, size, 12, 12, 5, 0.6)
     return (
-        ramp(t, (0.2, (222, 220, 214)), (0.8, (244, 243, 238))) + speckled(rng, size, 3)[..., None]
+        ramp(t, (0.2, (222, 220, 214)), (0.8, (244, 243, 238))) + speckle(rng, size, 3)[..., None]
     )
 
 
@@ -98,7 +98,7 @@ def glass_curtains(rng: np.random.Generator, size: int) -> Field:
     return np.asarray(blend(image, cloth, step(side, 0.27, 0.3) * np.float32(0.9)))
 
 
-def _panelled(light: Color, dark: Color) -> Surface:
+def _panel(light: Color, dark: Color) -> Surface:
     def draw(rng: np.random.Generator, size: int) -> Field:
         x, y = axes(size)
         pores = value_noise(rng, size, max(8, size // 3), 20)
@@ -112,7 +112,7 @@ def _panelled(light: Color, dark: Color) -> Surface:
                 np.abs(y - np.float32(cy)) - np.float32(hy),
             )
             line = step(d, -0.02, -0.01) - step(d, 0.0, 0.01)
-            image = blend(image, shaded(dark, 0.5), line * np.float32(0.8))
+            image = blend(image, shade(dark, 0.5), line * np.float32(0.8))
         return image
 
     return draw
@@ -138,7 +138,7 @@ def asphalt(rng: np.random.Generator, size: int) -> Field:
         (0.8, (104, 103, 102)),
     )
     line = np.float32(1) - step(np.abs(cracks - np.float32(0.42)), 0.0, 0.006)
-    return blend(image, (46, 46, 48), line * np.float32(0.6)) + speckled(rng, size, 6)[..., None]
+    return blend(image, (46, 46, 48), line * np.float32(0.6)) + speckle(rng, size, 6)[..., None]
 
 
 def paving(rng: np.random.Generator, size: int) -> Field:
@@ -149,7 +149,7 @@ def paving(rng: np.random.Generator, size: int) -> Field:
         (0.15, (148, 144, 138)),
         (0.85, (190, 186, 178)),
     )
-    return blend(image, (98, 95, 88), gap) + speckled(rng, size, 6)[..., None]
+    return blend(image, (98, 95, 88), gap) + speckle(rng, size, 6)[..., None]
 
 
 def cobbles(rng: np.random.Generator, size: int) -> Field:
@@ -161,7 +161,7 @@ def cobbles(rng: np.random.Generator, size: int) -> Field:
         (0.9, (162, 156, 148)),
     )
     image = image * (np.float32(1.08) - height * np.float32(0.16))[..., None]
-    return blend(image, (70, 66, 60), gap) + speckled(rng, size, 5)[..., None]
+    return blend(image, (70, 66, 60), gap) + speckle(rng, size, 5)[..., None]
 
 
 def gravel(rng: np.random.Generator, size: int) -> Field:
@@ -173,13 +173,13 @@ def gravel(rng: np.random.Generator, size: int) -> Field:
 
 def grass(rng: np.random.Generator, size: int) -> Field:
     blades = value_noise(rng, size, max(8, size // 2), max(8, size // 9))
-    leaning = warped(
+    leaning = warp(
         blades, fractal(rng, size, 16, 16, 2) * np.float32(0.03), blades * np.float32(0.01)
     )
     patches = fractal(rng, size, 5, 5, 5)
     t = leaning * np.float32(0.6) + patches * np.float32(0.4)
     image = ramp(t, (0.15, (48, 72, 28)), (0.5, (82, 112, 44)), (0.85, (126, 148, 72)))
-    return image + speckled(rng, size, 8)[..., None]
+    return image + speckle(rng, size, 8)[..., None]
 
 
 def leaves(dark: Color, light: Color, scale: int) -> Surface:
@@ -188,8 +188,8 @@ def leaves(dark: Color, light: Color, scale: int) -> Surface:
         b = fractal(rng, size, 14, 14, 4)
         t = a * np.float32(0.55) + b * np.float32(0.45)
         return (
-            ramp(t, (0.2, shaded(dark, 0.5)), (0.45, dark), (0.85, light))
-            + speckled(rng, size, 7)[..., None]
+            ramp(t, (0.2, shade(dark, 0.5)), (0.45, dark), (0.85, light))
+            + speckle(rng, size, 7)[..., None]
         )
 
     return draw
@@ -255,7 +255,7 @@ def signs(labels: list[str]) -> Callable[[np.random.Generator, int], Image.Image
             for i, word in enumerate(words):
                 at = cy + (0.026 * (i - 0.5) if len(words) > 1 else 0)
                 lines.append((word, cx, at, 0.026, (250, 250, 250)))
-        return lettered(Image.fromarray(bytes_of(image)), lines)
+        return draw_letters(Image.fromarray(bytes_of(image)), lines)
 
     return draw
 
@@ -265,8 +265,8 @@ IMAGES: dict[str, Surface] = {
     "paint": paint,
     "metal": metal,
     "louvre": louvre,
-    "door_oak": _panelled((172, 120, 72), (104, 66, 36)),
-    "door_blue": _panelled((70, 104, 136), (48, 78, 108)),
+    "door_oak": _panel((172, 120, 72), (104, 66, 36)),
+    "door_blue": _panel((70, 104, 136), (48, 78, 108)),
     "door_glass": door_glass,
     "glass_dark": glass_dark,
     "glass_sky": glass_sky,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from ptmtools_samples.campus.layout import BEYOND, Street, along
+from ptmtools_samples.campus.layout import BEYOND, Street, point_along
 
 SPEED = 11 / 3.6  # m/s: 11 km/h, as in the campus paper, section IV
 EYE = 1.6
@@ -19,19 +19,19 @@ def way_points(street: Street, length: float) -> list[tuple[float, float]]:
     """Returns points (x, z) at `RATE` per second along ``length`` metres of the rounded street."""
     line = street.line()
 
-    def rounded(s: float) -> tuple[float, float]:
-        around = [along(line, s + ROUNDING * (k - 8) / 8) for k in range(17)]
+    def round_corner(s: float) -> tuple[float, float]:
+        around = [point_along(line, s + ROUNDING * (k - 8) / 8) for k in range(17)]
         return sum(p[0] for p in around) / 17, sum(p[1] for p in around) / 17
 
     step = SPEED / RATE
-    points = [rounded(BEYOND)]
+    points = [round_corner(BEYOND)]
     s, pace = BEYOND, 0.05
     count = math.floor(length / step)
     at = points[0]
     gone = 0.0
     while len(points) <= count:
         s += pace
-        nearer = rounded(s)
+        nearer = round_corner(s)
         moved = math.dist(at, nearer)
         while gone + moved >= step * len(points) and len(points) <= count:
             share = (step * len(points) - gone) / moved

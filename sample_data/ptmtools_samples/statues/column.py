@@ -27,7 +27,7 @@ LOW, HIGH = (-0.37, -0.01, -0.37), (0.37, 1.03, 0.37)
 FLUTES = ((0.9914448614, 0.1305261922), (0.9238795325, 0.3826834324), (0.7933533403, 0.6087614290))
 
 
-def folded(p: Points) -> Points:
+def fold(p: Points) -> Points:
     """Maps points to the sector 0 ≤ z ≤ x, an eighth of the space around the axis."""
     x, y, z = p
     x, z = np.abs(x), np.abs(z)
@@ -40,7 +40,7 @@ class Column:
 
     def __call__(self, p: Points) -> Values:
         x, y, z = p
-        q = folded(p)
+        q = fold(p)
         out = np.sqrt(x * x + z * z)
         radius = 0.215 - 0.03 * y
         shaft = np.maximum((out - radius) * 0.99, np.maximum(-y, y - 0.56))
@@ -110,7 +110,7 @@ class Column:
         return np.asarray(np.maximum(from_eye - 0.055, np.abs(z) - thick) * 0.85)
 
     def _plate(self, p: Points) -> Values:
-        q = folded(p)
+        q = fold(p)
         lower = box(p, (0, 0.945, 0), (0.285, 0.022, 0.285), 0.002)
         upper = box(p, (0, 0.99, 0), (0.31, 0.022, 0.31), 0.002)
         hollow = disc(p, (0, 0.967, 0), 2.0, 0.008)

@@ -21,17 +21,17 @@ def _length(*parts: Values) -> Values:
     return np.asarray(np.sqrt(total))
 
 
-def moved(p: Points, to: Place) -> Points:
+def move(p: Points, to: Place) -> Points:
     return np.asarray(p - np.array(to)[:, None])
 
 
 def sphere(p: Points, middle: Place, radius: float) -> Values:
-    x, y, z = moved(p, middle)
+    x, y, z = move(p, middle)
     return _length(x, y, z) - radius
 
 
 def ellipsoid(p: Points, middle: Place, radii: Place) -> Values:
-    x, y, z = moved(p, middle) / np.array(radii)[:, None]
+    x, y, z = move(p, middle) / np.array(radii)[:, None]
     near = _length(x, y, z)
     steep = _length(x / radii[0], y / radii[1], z / radii[2])
     return np.asarray(near * (near - 1) / np.maximum(steep, 1e-9))
@@ -40,7 +40,7 @@ def ellipsoid(p: Points, middle: Place, radii: Place) -> Values:
 def capsule(p: Points, a: Place, b: Place, thick: float, end: float | None = None) -> Values:
     """A round bar from a to b, with radius ``thick`` at a and ``end`` at b."""
     along = np.array(b) - np.array(a)
-    x, y, z = moved(p, a)
+    x, y, z = move(p, a)
     square = float(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
     t = np.clip((x * along[0] + y * along[1] + z * along[2]) / square, 0, 1)
     away = _length(x - t * along[0], y - t * along[1], z - t * along[2])
@@ -48,14 +48,14 @@ def capsule(p: Points, a: Place, b: Place, thick: float, end: float | None = Non
 
 
 def box(p: Points, middle: Place, half: Place, rounding: float = 0.0) -> Values:
-    x, y, z = np.abs(moved(p, middle)) - (np.array(half) - rounding)[:, None]
+    x, y, z = np.abs(move(p, middle)) - (np.array(half) - rounding)[:, None]
     outside = _length(np.maximum(x, 0), np.maximum(y, 0), np.maximum(z, 0))
     return np.asarray(outside + np.minimum(np.maximum(np.maximum(x, y), z), 0) - rounding)
 
 
 def disc(p: Points, middle: Place, radius: float, half: float, rounding: float = 0.0) -> Values:
     """A round plate with an upright axis."""
-    x, y, z = moved(p, middle)
+    x, y, z = move(p, middle)
     out, up = _length(x, z) - (radius - rounding), np.abs(y) - (half - rounding)
     outside = _length(np.maximum(out, 0), np.maximum(up, 0))
     return np.asarray(outside + np.minimum(np.maximum(out, up), 0) - rounding)
@@ -63,7 +63,7 @@ def disc(p: Points, middle: Place, radius: float, half: float, rounding: float =
 
 def ring(p: Points, middle: Place, radius: float, thick: float) -> Values:
     """A torus with an upright axis."""
-    x, y, z = moved(p, middle)
+    x, y, z = move(p, middle)
     return _length(_length(x, z) - radius, y) - thick
 
 

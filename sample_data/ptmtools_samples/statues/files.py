@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import struct
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.glb import glb as pack_glb
 from ptmtools_samples.files import HEAD
 
 TITLE = f"{HEAD} statue"
@@ -81,10 +81,7 @@ def glb(points: Singles, triangles: Ints, colors: Colors, about: str) -> bytes:
         "buffers": [{"byteLength": at}],
     }
     text = json.dumps(tree, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    whole = 12 + 8 + len(text) + 8 + at
-    head = struct.pack("<4sIII4s", b"glTF", 2, whole, len(text), b"JSON") + text
-    return head + struct.pack("<I4s", at, b"BIN\0") + b"".join(parts)
+    return pack_glb([(b"JSON", text), (b"BIN\0", b"".join(parts))])
 
 
 FORMATS = {"ply": ply, "obj": obj, "glb": glb}
