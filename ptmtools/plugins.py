@@ -50,11 +50,11 @@ def points(kind: str) -> Mapping[str, EntryPoint]:
     table: dict[str, EntryPoint] = {}
     group = installed_points().select(group=f"ptmtools.{kind}")
     for point in sorted(group, key=lambda point: point.name):
-        other = table.setdefault(point.name, point)
-        if other.value != point.value:
+        first = table.setdefault(point.name, point)
+        if first.value != point.value:
             raise MissingComponentError(
                 "PTM-M110",
-                f"{other.value} and {point.value} both declare {point.name!r} in ptmtools.{kind}",
+                f"{first.value} and {point.value} both declare {point.name!r} in ptmtools.{kind}",
                 remedy="uninstall one of the two packages",
             )
     return table

@@ -187,7 +187,7 @@ def _as_given(job: FileJob, report: Report) -> Report:
     named = report | {"image": job.source, "file": os.fspath(job.target or STANDARD)}
     if job.target and "previews" in report:
         named["previews"] = [
-            each | {"file": os.fspath(job.target.with_name(os.path.basename(each["file"])))}
-            for each in report["previews"]
+            preview | {"file": os.fspath(job.target.with_name(os.path.basename(preview["file"])))}
+            for preview in report["previews"]
         ]
     return named

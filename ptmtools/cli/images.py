@@ -95,25 +95,7 @@ def encode(
         raise click.UsageError("--shard and --scheduler need named files, not -")
     coding = FileCoding(options, previews, orient, batch)
 
-    def lines(report: Report) -> Iterator[str]:
-        if report["skipped"]:
-            yield f"{report['file']}: exists and was skipped"
-            return
-        raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
-        name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
-        compared = f", {_share(stored, image)} the size of {name} ({size(image)})" if image else ""
-        yield (
-            f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
-            f"{_share(stored, raw)} the uncompressed size ({size(raw)}){compared}"
-        )
-        if made := report.get("previews"):
-            yield (
-                f"  {count(len(made), 'preview')}, {size(sum(each['bytes'] for each in made))}: "
-                f"{', '.join(os.path.basename(each['file']) for each in made)}"
-            )
-        elif note := _note_on_sides(report, options.max_side):
-            yield f"  {note}"
-
+    lines = partial(_encode_lines, max_side=options.max_side)
     if shard:
         total, jobs = len(jobs), shard.jobs(jobs)
         if not batch.console.as_json:
@@ -126,6 +108,27 @@ def encode(
     if not batch.console.as_json and (hint := _hint_on_lossy(reports, options)):
         batch.console.print(hint)
     return status
+
+
+def _encode_lines(report: Report, max_side: int) -> Iterator[str]:
+    """What `encode` prints on an image."""
+    if report["skipped"]:
+        yield f"{report['file']}: exists and was skipped"
+        return
+    raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
+    name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
+    compared = f", {_share(stored, image)} the size of {name} ({size(image)})" if image else ""
+    yield (
+        f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
+        f"{_share(stored, raw)} the uncompressed size ({size(raw)}){compared}"
+    )
+    if previews := report.get("previews"):
+        yield (
+            f"  {count(len(previews), 'preview')}, {size(sum(row['bytes'] for row in previews))}: "
+            f"{', '.join(os.path.basename(row['file']) for row in previews)}"
+        )
+    elif note := _note_on_sides(report, max_side):
+        yield f"  {note}"
 
 
 def _note_on_sides(report: Report, max_side: int) -> str | None:
@@ -200,9 +203,8 @@ def decode(
     .ptm files in it); or - for stdin. After a file that cannot be decoded, the command continues
     with the others.
     """
-    from ptmtools.texture.images import WRITTEN, write_to
+    from ptmtools.texture.images import WRITTEN
     from ptmtools.texture.images.files import writer
-    from ptmtools.texture.reader import open
 
     jobs = jobs_for(files, (".ptm",), output, "", tuple(WRITTEN))
     # A single output has the suffix that the user gave; others get one.
@@ -211,54 +213,69 @@ def decode(
         with naming(output):
             writer(Path(str(output)).suffix)
 
-    def work(job: FileJob, threads: int) -> Report:
-        source, target = job.source, job.target
-        where = standard_input() if source == STANDARD else source
-        with naming(source), open(where, limits=batch.limits, threads=threads) as ptm:
-            suffix = ".npy" if ptm.dtype.kind == "f" else ".png"
-            if target and named:
-                suffix = target.suffix
-            elif target:
-                target = target.with_name(target.name + suffix)
-            report: Report = {
-                "file": source,
-                "image": os.fspath(target) if target else STANDARD,
-                "skipped": batch.skips(target),
-            }
-            if report["skipped"]:
-                return report
-            number = max(0, ptm.whole - 1) if level is None else level
-            texels = ptm.window(number, *window) if window else ptm.level(number)
-            description, warning = Description(), None
-            try:
-                description = ptm.description()
-            except InputError as error:  # the texels are intact
-                warning = error
-        replace(job, target=target).put(
-            lambda file: write_to(file, suffix, texels, description), batch.force
-        )
-        height, width, components = texels.shape
-        return report | {
-            "level": number,
-            "width": width,
-            "height": height,
-            "components": components,
-            "kind": texels.dtype.name,
-            "warning": warning
-            and f"written without colour and orientation: {warning.message} [{warning.code}]",
+    work = partial(_decode_file, batch, level=level, window=window, named=named)
+    return batch.each(jobs, work, _decode_lines)[0]
+
+
+def _decode_file(
+    batch: Batch,
+    job: FileJob,
+    threads: int,
+    *,
+    level: int | None,
+    window: tuple[int, int, int, int] | None,
+    named: bool,
+) -> Report:
+    """Decodes a file; ``named``: the user has given the name of its image."""
+    from ptmtools.texture.images import write_to
+    from ptmtools.texture.reader import open
+
+    source, target = job.source, job.target
+    where = standard_input() if source == STANDARD else source
+    with naming(source), open(where, limits=batch.limits, threads=threads) as ptm:
+        suffix = ".npy" if ptm.dtype.kind == "f" else ".png"
+        if target and named:
+            suffix = target.suffix
+        elif target:
+            target = target.with_name(target.name + suffix)
+        report: Report = {
+            "file": source,
+            "image": os.fspath(target) if target else STANDARD,
+            "skipped": batch.skips(target),
         }
-
-    def lines(report: Report) -> Iterator[str]:
         if report["skipped"]:
-            yield f"{report['image']}: exists and was skipped"
-            return
-        kind = "" if report["kind"] == "uint8" else f" of {report['kind']}"
-        yield (
-            f"{report['image']}: {report['width']} x {report['height']}, "
-            f"{count(report['components'], 'component')}{kind}, level {report['level']}"
-        )
+            return report
+        number = max(0, ptm.whole - 1) if level is None else level
+        texels = ptm.window(number, *window) if window else ptm.level(number)
+        description, warning = Description(), None
+        try:
+            description = ptm.description()
+        except InputError as error:  # the texels are intact
+            warning = f"written without colour and orientation: {error.message} [{error.code}]"
+    replace(job, target=target).put(
+        lambda file: write_to(file, suffix, texels, description), batch.force
+    )
+    height, width, components = texels.shape
+    return report | {
+        "level": number,
+        "width": width,
+        "height": height,
+        "components": components,
+        "kind": texels.dtype.name,
+        "warning": warning,
+    }
 
-    return batch.each(jobs, work, lines)[0]
+
+def _decode_lines(report: Report) -> Iterator[str]:
+    """What `decode` prints on a file."""
+    if report["skipped"]:
+        yield f"{report['image']}: exists and was skipped"
+        return
+    kind = "" if report["kind"] == "uint8" else f" of {report['kind']}"
+    yield (
+        f"{report['image']}: {report['width']} x {report['height']}, "
+        f"{count(report['components'], 'component')}{kind}, level {report['level']}"
+    )
 
 
 def _refuse_image_suffix(output: str) -> None:

@@ -162,15 +162,15 @@ def _levels(header: PtmHeader) -> list[dict[str, Any]]:
     per_texel = gpu_texel_bytes(header.texel_bytes, header.components)
     records, texels = [], 0
     for level in header.levels:
-        here = level.width * level.height
-        texels += here
+        level_texels = level.width * level.height
+        texels += level_texels
         records.append(
             {
                 **asdict(level),
                 "end": level.end,
                 "share": level.length / header.file_size,
-                "bits_per_texel": 8 * level.length / here,
-                "texel_bytes": header.texel_bytes * here,
+                "bits_per_texel": 8 * level.length / level_texels,
+                "texel_bytes": header.texel_bytes * level_texels,
                 "gpu_bytes_padded": per_texel * texels,
             }
         )
@@ -188,15 +188,15 @@ def _description(data: bytes, crc32: int) -> Description | None:
         return None
 
 
-def _description_fields(description: Description) -> dict[str, Any]:
+def _description_fields(given: Description) -> dict[str, Any]:
     """The fields of a description that are set."""
-    own = description
     fields = {
-        "icc_bytes": None if own.icc is None else len(own.icc),
-        "srgb_intent": own.srgb,
-        "gamma": None if own.gamma is None else own.gamma / 100_000,
-        "chromaticities": own.chromaticities and [part / 100_000 for part in own.chromaticities],
-        "orientation": None if own.orientation == 1 else own.orientation,
+        "icc_bytes": None if given.icc is None else len(given.icc),
+        "srgb_intent": given.srgb,
+        "gamma": None if given.gamma is None else given.gamma / 100_000,
+        "chromaticities": given.chromaticities
+        and [part / 100_000 for part in given.chromaticities],
+        "orientation": None if given.orientation == 1 else given.orientation,
     }
     return {name: value for name, value in fields.items() if value is not None}
 
@@ -243,9 +243,9 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
     yield "unit", f"{space.metres:g} m ({'guessed' if space.unit_guessed else 'given'})"
     yield "up axis", f"{space.up.upper()} ({'guessed' if space.up_guessed else 'given'})"
     yield "best guess", _guess(model.best)
-    for place, other in enumerate(model.others):
-        if place == 0 or other.rival:
-            yield "alternative", _guess(other)
+    for place, guess in enumerate(model.others):
+        if place == 0 or guess.rival:
+            yield "alternative", _guess(guess)
     yield "closed", _closed_text(around)
     names = f": {some(list(around.doors))}" if around.doors else ""
     yield "doors", f"{len(around.doors)} recognised{names}"

@@ -166,8 +166,8 @@ def publish(
             "https://example.org/walk/"
         )
     kind = folder_kind(Path(db))
-    own = {name: getattr(site_options, name) for name in OPTIONS}
-    if kind and site_options != SiteOptions(**own):
+    kept = {name: getattr(site_options, name) for name in OPTIONS}
+    if kind and site_options != SiteOptions(**kept):
         names = ", ".join(f"--{name}" for name in OPTIONS)
         raise click.UsageError(
             f"of the options of a site, a folder with {kind.index} has {names} only"

@@ -87,6 +87,6 @@ def _refuse_others(target: str, kind: FolderKind | None) -> None:
     classes = {"a database": ViewOptions} | {k.noun: d.load() for k, d in _DRAWN.items()}
     noun = kind.noun if kind and kind.drawing else "a database"
     names = {option_name(field) for field in fields(classes[noun])}
-    for other, options in classes.items():
+    for drawn, options in classes.items():
         for wrong in sorted(given_options(options) - names):
-            raise click.UsageError(f"--{wrong} is for {other}; {target} is {noun}")
+            raise click.UsageError(f"--{wrong} is for {drawn}; {target} is {noun}")

@@ -328,18 +328,9 @@ class _GlbReader:
     def _material(self, index: int) -> ReadMaterial:
         material = self._row("materials", index)
         surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
-        factor = surface.get("baseColorFactor", WHITE)
-        normal_extras = {name for name in extras if name.startswith("normal")}
-        if (
-            extras.keys() - {"mesh", "light"} - normal_extras
-            and not {"ptm", "texture"} <= extras.keys()
-        ):
-            _foreign(
-                f"materials[{index}].extras",
-                "has members of a texture, but not its .ptm and its place",
-            )
         wrap, clamp = _wrap(extras), WRAPS["clamp"]
         place = f"materials[{index}]"
+        _check_extras(material, extras, place)
         image = self._image(surface.get("baseColorTexture"), wrap, place)
         lightmap = self._image(material.get("occlusionTexture"), (clamp, clamp), place)
         coords = extras.get("normalCoords")
@@ -352,23 +343,9 @@ class _GlbReader:
                     if f"normalW{name[1:]}" in extras
                 }
             )
-        normal_use = material.get("normalTexture")
-        normal_map = self._image(normal_use, normal_wrap, place)
-        scale = extras.get("normalScale", 1)
-        if normal_use is not None and (
-            normal_use.get("texCoord", 0) != (1 if coords is None else coords)
-            or normal_use.get("scale", 1) != scale
-        ):
-            _foreign(place, "its normal map and its extras differ")
-        if normal_extras - {"normal"} and not {"normal", "normalCoords"} <= extras.keys():
-            _foreign(place, "has members of a normal map, but not its place and coordinates")
-        for image_of, name in ((lightmap, "light"), (normal_map, "normal")):
-            if image_of is not None and name not in extras:
-                _foreign(place, f"has an image of {name}, but not its place in the hints")
-        if "light" in extras and "normal" in extras and coords is None:
-            _foreign(place, "has both a lightmap and a normal map")
+        normal_map = self._image(material.get("normalTexture"), normal_wrap, place)
         return ReadMaterial(
-            factor=tuple(factor),
+            factor=tuple(surface.get("baseColorFactor", WHITE)),
             two_sided=material.get("doubleSided", False),
             blends=material.get("alphaMode", "OPAQUE") != "OPAQUE",
             cutoff=material.get("alphaCutoff", 0.5)
@@ -384,7 +361,7 @@ class _GlbReader:
             normal=extras.get("normal"),
             normal_map=normal_map,
             coords=coords,
-            scale=scale,
+            scale=extras.get("normalScale", 1),
             normal_wrap=normal_wrap,
         )
 
@@ -404,6 +381,26 @@ class _GlbReader:
 
 def _wrap(sampler: dict[str, Any]) -> tuple[int, int]:
     return sampler.get("wrapS", WRAPS["repeat"]), sampler.get("wrapT", WRAPS["repeat"])
+
+
+def _check_extras(material: Mapping[str, Any], extras: Mapping[str, Any], place: str) -> None:
+    """Raises FileError PTM-D731 where the extras of a material and its textures differ."""
+    of_normal = {name for name in extras if name.startswith("normal")}
+    if extras.keys() - {"mesh", "light"} - of_normal and not {"ptm", "texture"} <= extras.keys():
+        _foreign(f"{place}.extras", "has members of a texture, but not its .ptm and its place")
+    coords, use = extras.get("normalCoords"), material.get("normalTexture")
+    if use is not None and (
+        use.get("texCoord", 0) != (1 if coords is None else coords)
+        or use.get("scale", 1) != extras.get("normalScale", 1)
+    ):
+        _foreign(place, "its normal map and its extras differ")
+    if of_normal - {"normal"} and not {"normal", "normalCoords"} <= extras.keys():
+        _foreign(place, "has members of a normal map, but not its place and coordinates")
+    for texture, name in (("occlusionTexture", "light"), ("normalTexture", "normal")):
+        if material.get(texture) is not None and name not in extras:
+            _foreign(place, f"has an image of {name}, but not its place in the hints")
+    if "light" in extras and "normal" in extras and coords is None:
+        _foreign(place, "has both a lightmap and a normal map")
 
 
 def _foreign(place: str, message: str) -> NoReturn:

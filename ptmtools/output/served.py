@@ -104,21 +104,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     DatabaseError: PTM-D001 there is no `hints.json`; PTM-D005 a file is missing; PTM-D006 one is
         damaged; PTM-D606 there is no geometry in glTF.
     """
-    folder = Path(database)
-    if not (folder / HINTS).exists():
-        folder /= SERVED
-    if not (folder / HINTS).exists():
-        raise DatabaseError(
-            "PTM-D001", f"there is no {HINTS}", file=database, remedy="build a database first"
-        )
-    index, index_bytes = _document(folder / HINTS, schemas.HINTS)
-    if FORM not in index["geometry"]:
-        raise DatabaseError(
-            "PTM-D606",
-            "has no geometry in glTF, which clients of the hints need",
-            file=database,
-            remedy="write it with `ptm emit DB --format vrml,gltf`",
-        )
+    folder, (index, index_bytes) = _find_index(database)
     names = [cell["name"] for cell in index["cells"]]
     pairs = [
         _document(_template_path(folder, index["record"], name), schemas.CELL) for name in names
@@ -161,6 +147,26 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         surfaces_of(geometry, locator),
         locator,
     )
+
+
+def _find_index(database: str | os.PathLike[str]) -> tuple[Path, tuple[Document, int]]:
+    """The served folder, and its index as `_document` returns it; raises as `read_served`."""
+    folder = Path(database)
+    if not (folder / HINTS).exists():
+        folder /= SERVED
+    if not (folder / HINTS).exists():
+        raise DatabaseError(
+            "PTM-D001", f"there is no {HINTS}", file=database, remedy="build a database first"
+        )
+    index, index_bytes = _document(folder / HINTS, schemas.HINTS)
+    if FORM not in index["geometry"]:
+        raise DatabaseError(
+            "PTM-D606",
+            "has no geometry in glTF, which clients of the hints need",
+            file=database,
+            remedy="write it with `ptm emit DB --format vrml,gltf`",
+        )
+    return folder, (index, index_bytes)
 
 
 def place_names(database: str | os.PathLike[str]) -> tuple[str, ...]:

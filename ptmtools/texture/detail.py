@@ -44,19 +44,19 @@ def integer_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> f
         row = min(y >> 1, height - 1)
         of_row = 0.0
         for x in range(width):
-            left, right = np.int64(0), np.int64(0)
+            even, uneven = np.int64(0), np.int64(0)
             for c in range(colours):
                 under = np.int64(below[row, x, c])
-                one = np.int64(level[y, 2 * x, c]) - under
-                other = np.int64(level[y, 2 * x + 1, c]) - under
-                left += one * one
-                right += other * other
-            of_row += math.sqrt(float(left)) + math.sqrt(float(right))
+                even_change = np.int64(level[y, 2 * x, c]) - under
+                odd_change = np.int64(level[y, 2 * x + 1, c]) - under
+                even += even_change * even_change
+                uneven += odd_change * odd_change
+            of_row += math.sqrt(float(even)) + math.sqrt(float(uneven))
         for x in range(2 * width, level.shape[1]):
             odd = np.int64(0)
             for c in range(colours):
-                one = np.int64(level[y, x, c]) - np.int64(below[row, width - 1, c])
-                odd += one * one
+                change = np.int64(level[y, x, c]) - np.int64(below[row, width - 1, c])
+                odd += change * change
             of_row += math.sqrt(float(odd))
         total += of_row
     return total
