@@ -74,8 +74,6 @@ GRAZING_COSINE = 1e-9
 #: Points examined beside an edge of a face lie this share of the way towards its middle: 5 mm in a
 #: wall of 10 m, above the rounding of float32 in a face of a centimetre.
 INWARD_SHARE = 1e-3
-#: Directions whose length differs from 1 by less are unit vectors: of six digits.
-UNIT_SHARE = 1e-5
 
 
 @dataclass(frozen=True)

@@ -184,6 +184,11 @@ def _pairs(corner: Floats, among: Ints) -> tuple[Ints, Ints]:
     return np.concatenate(ones), np.concatenate(others)
 
 
+def stack_rows(rows: list[NDArray[Any]], width: int) -> Floats:
+    """(n, 3, width) rows of several arrays, float64."""
+    return np.concatenate([np.zeros((0, 3, width)), *rows])
+
+
 def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     """The triangles of all cells; `locator` has their leaves."""
     shapes = [(glb.cell, p) for glb in geometry for p in glb.primitives]
@@ -192,9 +197,6 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     def spread(values: list[Any], kind: type[np.generic], *shape: int) -> NDArray[Any]:
         rows = np.array(values, dtype=kind).reshape(len(shapes), *shape)
         return np.repeat(rows, count, axis=0)
-
-    def stack_rows(rows: list[NDArray[Any]], width: int) -> Floats:
-        return np.concatenate([np.zeros((0, 3, width)), *rows])
 
     materials = [p.material for _, p in shapes]
     texture = [

@@ -30,7 +30,7 @@ from ptmtools.errors import InputError, PtmError
 from ptmtools.files import open_below
 from ptmtools.glb import glb_chunks
 from ptmtools.output.served import on_link
-from ptmtools.output.surfaces import Surfaces
+from ptmtools.output.surfaces import Surfaces, stack_rows
 from ptmtools.rendering.pyramids import mip_levels, pack_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import to_srgb
@@ -271,7 +271,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
         rows_of = np.array(values, dtype=kind).reshape(len(rows), *shape)
         return np.repeat(rows_of, count, axis=0)
 
-    corner = _stack_rows([p.point[p.triangle] for _, p in rows], 3)
+    corner = stack_rows([p.point[p.triangle] for _, p in rows], 3)
     lit = campus.lightmaps != "none" and any(len(o.meshes) > 1 for o in campus.objects)
     bright = [_brightness(p, lit and level == 0) for _, p in rows]
     color = np.concatenate([np.zeros((0, 3)), *bright])
@@ -279,7 +279,7 @@ def read_surfaces(folder: Path, stock: Stock, level: int) -> Surfaces:
     glass = [m.alpha == "blend" and t < 0 for m, t in zip(looks, texture, strict=True)]
     return Surfaces(
         corner=corner,
-        uv=_stack_rows([_texture_points(p) for _, p in rows], 2),
+        uv=stack_rows([_texture_points(p) for _, p in rows], 2),
         cell=spread([number for number, _ in rows], np.int32),
         shape=np.repeat(np.arange(len(rows), dtype=np.int32), count),
         texture=spread(texture, np.int32),
@@ -326,7 +326,3 @@ def _texture_points(primitive: Primitive) -> Floats:
     if primitive.uv is None:
         return np.zeros((len(primitive.triangle), 3, 2))
     return primitive.uv[primitive.triangle]
-
-
-def _stack_rows(rows: list[Floats], width: int) -> Floats:
-    return np.concatenate([np.zeros((0, 3, width)), *rows])

@@ -32,9 +32,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Floats, Ints, sum_by_group
 from ptmtools.site.client import BEHIND, BEYOND, HELD, NEAREST, NOTHING, SURROUNDINGS
-from ptmtools_lab.catalogue import Catalogue
 from ptmtools_lab.policies.engine import EngineClient, Worth
 
 
@@ -135,7 +134,7 @@ def by_box(client: EngineClient, shapes: Ints) -> Floats:
     """The shares of the screen that the boxes of the shapes cover, without occlusion."""
     stock = client.world.catalogue
     covered = client.frustum.covered_shares(stock.shapes.low[shapes], stock.shapes.high[shapes])
-    return _sum_by_texture(stock, shapes, covered)
+    return sum_by_group(stock.shapes.texture[shapes], covered, stock.texture_count)
 
 
 def coverage_shares(client: EngineClient, shapes: Ints) -> Floats:
@@ -180,14 +179,8 @@ def _split(client: EngineClient, shapes: Ints, coverage: Floats) -> Floats:
     count = np.bincount(stock.shapes.cell[shapes], minlength=stock.cell_count)
     of_cell *= count > 0
     shape_share = of_cell / max(float(of_cell.sum()), 1e-12) / np.maximum(count, 1)
-    return _sum_by_texture(stock, shapes, shape_share[stock.shapes.cell[shapes]])
-
-
-def _sum_by_texture(stock: Catalogue, shapes: Ints, of_shape: Floats) -> Floats:
-    """(T,) sums over the shapes of each texture."""
-    result = np.zeros(stock.texture_count)
-    np.add.at(result, stock.shapes.texture[shapes], of_shape)
-    return result
+    share = shape_share[stock.shapes.cell[shapes]]
+    return sum_by_group(stock.shapes.texture[shapes], share, stock.texture_count)
 
 
 #: Weight of the surroundings beside the screen in policies other than `BEST`.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.arrays import Floats, Singles
+from ptmtools.arrays import Floats
 from ptmtools.glb import (
     BINARY,
     JSON,
@@ -23,6 +23,7 @@ from ptmtools.glb import (
     natural,
     one_mesh,
 )
+from ptmtools.output.gltf_shapes import flip_v
 from ptmtools_systems.campus.model import CampusMaterial
 
 _ADD: dict[str, Callable[[BufferWriter, NDArray[Any]], int]] = {
@@ -63,9 +64,9 @@ def mesh_bytes(mesh: Corners, materials: tuple[CampusMaterial, ...]) -> bytes:
         material = materials[index]
         data: dict[str, NDArray[Any]] = {"POSITION": mesh.point[faces].astype("<f4")}
         if material.base is not None:
-            data["TEXCOORD_0"] = _flip_v(mesh.uv[faces])
+            data["TEXCOORD_0"] = flip_v(mesh.uv[faces])
         if mesh.light is not None:
-            data["TEXCOORD_1"] = _flip_v(mesh.light[faces])
+            data["TEXCOORD_1"] = flip_v(mesh.light[faces])
         if mesh.color is not None:
             texels = np.full((len(faces), 3, 4), 65535, "<u2")
             texels[..., :3] = np.rint(65535 * np.clip(mesh.color[faces], 0, 1))
@@ -180,11 +181,6 @@ def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primiti
         light,
         None if color is None else color[:, :3],
     )
-
-
-def _flip_v(uv: Floats) -> Singles:
-    """Coordinates with the origin at the upper left."""
-    return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1).astype("<f4")
 
 
 def _vertices(rows: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -256,8 +256,3 @@ def railing(ring: Ring, y: float, material: str) -> list[Face]:
         for v in (y + 0.45, y + 0.9):
             faces += box(wall, material, (0.04, v, -0.055), (wall.length - 0.04, v + 0.05, -0.005))
     return faces
-
-
-def ground_lid(rings: list[Ring]) -> list[Face]:
-    """The underside that closes a building."""
-    return lid(rings, 0.0, "concrete", up=False)

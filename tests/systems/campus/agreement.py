@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.tolerance import UNIT_SHARE
 from ptmtools_systems.campus.meshes import read_mesh
 from ptmtools_systems.campus.model import (
     INDEX,
@@ -24,6 +23,9 @@ from ptmtools_systems.campus.model import (
     mesh_file,
     texture_file,
 )
+
+#: Directions whose length differs from 1 by less are unit vectors: of six digits.
+UNIT_SHARE = 1e-5
 
 
 def disagreements(folder: Path) -> list[str]:
