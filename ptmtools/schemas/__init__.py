@@ -29,9 +29,7 @@ from typing import Any
 #: Names of the schemas.
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, FILES, VALIDATION, GLB, SCENE = "manifest", "files", "validation", "glb", "scene"
-WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
-MESSAGES, TOUR = "messages", "tour"
-INTERLACE, APO, CAMPUS, CAMPUS_WALK = "interlace", "apo", "campus", "campus_walk"
+WALK, TRACE, SITE, MESSAGES, TOUR = "walk", "trace", "site", "messages", "tour"
 #: Levels of lists and objects in a value without a schema.
 DEEPEST = 16
 
@@ -89,8 +87,10 @@ class ShapeError(ValueError):
 
 
 def schema_text(name: str) -> str:
-    """The text of a schema."""
-    return files(__name__).joinpath(f"{name}.schema.json").read_text("utf-8")
+    """The text of a schema; ``name`` is its package and name, ``ptmtools_systems.schemas:apo``, or
+    the name of one of this package."""
+    package, _, stem = name.rpartition(":")
+    return files(package or __name__).joinpath(f"{stem}.schema.json").read_text("utf-8")
 
 
 def read(data: bytes, name: str) -> Any:

@@ -1,10 +1,10 @@
 """Octree textures: the kind of folder that `ptm apo` writes, and the representation of objects of a
 database."""
 
-from ptmtools import schemas
 from ptmtools.folder_kinds import FolderDrawing, FolderKind
 from ptmtools.lazy import Lazy
 from ptmtools.output.representation import Representation
+from ptmtools_systems.schemas import APO
 
 APO_FOLDER = FolderKind(
     index="apo.json",
@@ -12,7 +12,7 @@ APO_FOLDER = FolderKind(
     again="ptm apo MESH",
     check=Lazy("ptmtools_systems.apo.checking:check_folder"),
     describe=Lazy("ptmtools_systems.apo.checking:describe"),
-    schema=schemas.APO,
+    schema=APO,
     script="apo.js",
     files=Lazy("ptmtools_systems.apo.files:page_files"),
     drawing=FolderDrawing(

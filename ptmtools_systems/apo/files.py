@@ -28,6 +28,7 @@ from ptmtools.glb import BINARY, INT, JSON, SHORT, BufferWriter, glb_chunks, one
 from ptmtools.whole_folder import FolderForm
 from ptmtools_systems.apo.making import ApoTexture, Simple
 from ptmtools_systems.apo.model import ADDRESS_BITS, Octree
+from ptmtools_systems.schemas import APO
 
 
 def glb_of(mesh: Simple) -> bytes:
@@ -216,7 +217,7 @@ def _index(data: bytes) -> Index:
                 f"is {declared.get('format')!r}, schema {declared.get('schema')!r}, not "
                 f"{FORMAT!r}, schema {SCHEMA}"
             )
-        schemas.check(document, schemas.APO)
+        schemas.check(document, APO)
     except schemas.ShapeError as fault:
         raise InputError(
             "PTM-I821", fault.message, place=fault.place or None, remedy=_AGAIN

@@ -1,8 +1,8 @@
 """Campuses: the kind of folder that `ptm campus` writes."""
 
-from ptmtools import schemas
 from ptmtools.folder_kinds import FolderKind
 from ptmtools.lazy import Lazy
+from ptmtools_systems.schemas import CAMPUS
 
 CAMPUS_FOLDER = FolderKind(
     index="campus.json",
@@ -10,7 +10,7 @@ CAMPUS_FOLDER = FolderKind(
     again="ptm campus MODEL",
     check=Lazy("ptmtools_systems.campus.validation:check_campus"),
     describe=Lazy("ptmtools_systems.campus.reading:describe_campus"),
-    schema=schemas.CAMPUS,
+    schema=CAMPUS,
     script="campus.js",
     files=Lazy("ptmtools_systems.campus.reading:page_files"),
     records=True,

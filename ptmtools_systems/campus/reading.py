@@ -21,6 +21,7 @@ from ptmtools_systems.campus.model import (
     SIZES,
     Campus,
 )
+from ptmtools_systems.schemas import CAMPUS
 
 #: Longest index, bytes.
 LONGEST = 1 << 28
@@ -51,7 +52,7 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
     if len(data) > LONGEST:
         raise LimitError("PTM-L204", "is too long for the index of a campus", file=file)
     try:
-        campus = Campus.from_document(schemas.read(data, schemas.CAMPUS))
+        campus = Campus.from_document(schemas.read(data, CAMPUS))
     except schemas.ShapeError as fault:
         raise wrong(fault.place or None, fault.message) from None
     for place, item in enumerate(campus.objects):

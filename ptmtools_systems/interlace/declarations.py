@@ -1,10 +1,10 @@
 """Interlaced images: the kind of folder that `ptm interlace` writes, and the form of the textures
 of a database."""
 
-from ptmtools import schemas
 from ptmtools.folder_kinds import FolderKind
 from ptmtools.lazy import Lazy
 from ptmtools.output.emitter import Emitter, SiteTextures
+from ptmtools_systems.schemas import INTERLACE
 
 INTERLACE_FOLDER = FolderKind(
     index="interlace.json",
@@ -12,7 +12,7 @@ INTERLACE_FOLDER = FolderKind(
     again="ptm interlace IMAGE",
     check=Lazy("ptmtools_systems.interlace.reading:validate_interlaced"),
     describe=Lazy("ptmtools_systems.interlace.reading:describe"),
-    schema=schemas.INTERLACE,
+    schema=INTERLACE,
     script="interlace.js",
     files=Lazy("ptmtools_systems.interlace.reading:page_files"),
 )

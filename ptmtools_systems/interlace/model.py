@@ -92,7 +92,7 @@ class Interlaced:
         return sum(part.bytes for part in self.parts)
 
     def document(self) -> dict[str, Any]:
-        """The manifest as JSON; `ptmtools/schemas/interlace.schema.json` describes it."""
+        """The manifest as JSON; `schemas/interlace.schema.json` describes it."""
         document: dict[str, Any] = {"format": FORMAT, "schema": SCHEMA, **vars(self)}
         document["original"] = _sides(self.original)
         document["files"] = [{**vars(p), "joined": _sides(p.joined)} for p in document.pop("parts")]

@@ -25,6 +25,7 @@ from ptmtools.texture.model import Limits
 from ptmtools_systems.interlace.containers import CONTAINERS, Texels
 from ptmtools_systems.interlace.model import INDEX, Interlaced, InterlacedFile, axes_of, sizes_of
 from ptmtools_systems.interlace.steps import join
+from ptmtools_systems.schemas import INTERLACE
 
 _LIMITS = Limits()
 #: A manifest of 33 files has 7 kB; more fields may be added.
@@ -69,7 +70,7 @@ def _document(data: bytes) -> dict[str, Any]:
                 f"has the schema number {str(number)[:20]}; this program knows 1",
                 remedy="update ptmtools, or write the folder again",
             )
-        schemas.check(document, schemas.INTERLACE)
+        schemas.check(document, INTERLACE)
     except schemas.ShapeError as fault:
         raise InputError(
             "PTM-I821",

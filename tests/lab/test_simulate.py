@@ -17,6 +17,7 @@ from ptmtools_lab.comparing import SimulateOptions, play
 from ptmtools_lab.forms import PTM
 from ptmtools_lab.policies import POLICIES, PolicyEntry
 from ptmtools_lab.report import COLUMNS, table
+from ptmtools_lab.schemas import SIMULATION
 from ptmtools_lab.simulation import simulate
 from ptmtools_lab.world import World
 from tests.lab.conftest import Ptm
@@ -31,7 +32,7 @@ def test_json_and_csv(ptm: Ptm, two_rooms: Path, walk_file: Path, tmp_path: Path
     ]
     done = ptm(*words, tmp_path / "frames.csv")
     assert (done.status, done.err) == (0, "")
-    document = schemas.read(done.out.encode(), schemas.SIMULATION)
+    document = schemas.read(done.out.encode(), SIMULATION)
     runs = document["runs"]
     assert len(runs) == 3 * 2 * 2
     assert [run["policy"] for run in runs[:3]] == ["paper", "ach", "oracle"]
@@ -210,9 +211,7 @@ def test_the_parameters_of_the_paper(two_rooms: Path, walk_file: Path, ptm: Ptm)
         "staticAfter": 1,
     }
     given = ["--delta-t", "0", "--delta-t-static", "0", "--static-memory", "inf"]
-    own = schemas.read(
-        ptm(*words, "--memory", "20%", *given, "--json").out.encode(), schemas.SIMULATION
-    )
+    own = schemas.read(ptm(*words, "--memory", "20%", *given, "--json").out.encode(), SIMULATION)
     assert own["paper"]["staticMemory"] == "inf"
     (first,), (second,) = plain["runs"], own["runs"]
     assert first["uploadedBytes"] > second["uploadedBytes"] == 0

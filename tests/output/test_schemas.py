@@ -20,6 +20,7 @@ from ptmtools.output.model import FileError
 from ptmtools.output.validation.hints import read_file
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
+from ptmtools_lab.schemas import CAMPUS_WALK
 
 Step = str | int
 
@@ -30,7 +31,7 @@ SERVED = {
     schemas.CELL: "hints/c0001.json",
     schemas.STATISTICS: "hints/statistics.json",
 }
-NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION, schemas.TRACE, schemas.CAMPUS_WALK)
+NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION, schemas.TRACE, CAMPUS_WALK)
 
 
 def validator(name: str) -> jsonschema.Draft202012Validator:
@@ -128,8 +129,9 @@ TRACE = {
 def test_schemas_are_schemas(name: str) -> None:
     schema = json.loads(schemas.schema_text(name))
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert f"{name}.schema.json" in (DOCS / "formats/schemas.md").read_text()
-    assert schema["$id"] == f"urn:ptmtools:{name}:{schema['properties']['schema']['const']}"
+    stem = name.split(":")[-1]
+    assert f"{stem}.schema.json" in (DOCS / "formats/schemas.md").read_text()
+    assert schema["$id"] == f"urn:ptmtools:{stem}:{schema['properties']['schema']['const']}"
 
 
 @pytest.mark.parametrize("name", SERVED)

@@ -18,6 +18,7 @@ from ptmtools.walk import read_walk
 from ptmtools_lab.campus.options import CampusWalkOptions
 from ptmtools_lab.campus.simulation import CAMPUS_POLICIES, measure_campus_walk, simulate_campus
 from ptmtools_lab.campus.world import CampusWorld, prepare_campus
+from ptmtools_lab.schemas import SIMULATION
 from ptmtools_lab.world import World
 from ptmtools_systems.campus import CampusOptions, make_campus
 from tests.lab.test_recording import document, parsed
@@ -102,7 +103,7 @@ def test_the_table(
     assert all(float(row["e"]) >= 0 for row in campus)
 
     assert main([*asked, "--json"]) == 0
-    reported = schemas.read(capsys.readouterr().out.encode(), schemas.SIMULATION)
+    reported = schemas.read(capsys.readouterr().out.encode(), SIMULATION)
     best_run, low_run = reported["runs"]
     assert low_run["rmse"] is low_run["waste"] is low_run["details"]["quality"]["mean"] is None
     assert best_run["rmse"] > 0

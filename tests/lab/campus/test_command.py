@@ -10,6 +10,7 @@ import pytest
 from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.walk import Walk, walk_text
+from ptmtools_lab.schemas import CAMPUS_WALK
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def test_options_and_json(folder: Path, walk: str, capsys: pytest.CaptureFixture
     asked = ["--preset", "low,ultra-cached", "--bandwidth", "512k", "--nearest", "1", "--memory",
              "1MiB", "--threads", "2", "--no-lightmaps", "--every", "0", "--json"]  # fmt: skip
     assert main(["walk-campus", str(folder), "--walk", walk, *asked]) == 0
-    reported = schemas.read(capsys.readouterr().out.encode(), schemas.CAMPUS_WALK)
+    reported = schemas.read(capsys.readouterr().out.encode(), CAMPUS_WALK)
     low, cached = reported["runs"]
     assert (low["preset"], cached["preset"]) == ("Low", "Ultra cached")
     assert (low["bandwidth"], low["e"], cached["bytes"]) == (512_000, None, 0)
@@ -54,7 +55,7 @@ def test_one_frame_and_more_near_than_there_are(
     walk.write_text(walk_text(Walk(np.array([0.0, 0.1]), eye, look, 1.0472, 1.7778)))
     asked = ["--walk", str(walk), "--nearest", "9" * 30, "--preset", "low", "--every", "0"]
     assert main(["walk-campus", str(folder), *asked, "--json"]) == 0
-    (run,) = schemas.read(capsys.readouterr().out.encode(), schemas.CAMPUS_WALK)["runs"]
+    (run,) = schemas.read(capsys.readouterr().out.encode(), CAMPUS_WALK)["runs"]
     assert (run["idle"], run["late"]) == (0, 1)
 
 

@@ -39,6 +39,7 @@ from ptmtools_systems.apo.files import (
 from ptmtools_systems.apo.making import make_apo
 from ptmtools_systems.apo.model import ApoOptions
 from ptmtools_systems.apo.octree import fault_of
+from ptmtools_systems.schemas import APO
 from tests.systems.apo.building import nodes, octree_of
 from tests.systems.apo.meshes import ply, scene_of, sphere
 
@@ -118,7 +119,7 @@ def test_the_mesh_comes_back(written: Path) -> None:
 
 
 def test_the_index_matches_its_schema_and_says_what_it_was_made_with(written: Path) -> None:
-    document = schemas.read((written / INDEX).read_bytes(), schemas.APO)
+    document = schemas.read((written / INDEX).read_bytes(), APO)
     assert document["options"]["error"] == 0.2
     assert document["options"]["density"] == ApoOptions().density
     assert document["source"]["triangles"] == 5120

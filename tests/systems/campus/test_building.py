@@ -21,6 +21,7 @@ from ptmtools.pipeline.validation import validate
 from ptmtools.scene import IngestOptions
 from ptmtools_systems.campus import Campus, CampusOptions, distances, make_campus, read_campus
 from ptmtools_systems.campus.meshes import read_mesh
+from ptmtools_systems.schemas import CAMPUS
 from tests.conftest import files_below
 from tests.systems.campus.models import write_gltf
 
@@ -45,13 +46,13 @@ def test_it_is_valid(made: Path, plain: Path) -> None:
 
 
 def test_the_schema_is_a_schema_and_the_index_satisfies_it(made: Path) -> None:
-    schema = json.loads(schemas.schema_text(schemas.CAMPUS))
+    schema = json.loads(schemas.schema_text(CAMPUS))
     jsonschema.Draft202012Validator.check_schema(schema)
     document = json.loads((made / "campus.json").read_text())
     jsonschema.Draft202012Validator(schema).validate(document)
     # Others may have been added.
     document["later"] = document["objects"][0]["later"] = document["materials"][0]["later"] = 1
-    schemas.check(document, schemas.CAMPUS)
+    schemas.check(document, CAMPUS)
     assert Campus.from_document(document) == read_campus(made)
 
 

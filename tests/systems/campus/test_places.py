@@ -15,6 +15,7 @@ from ptmtools.scene import IngestOptions
 from ptmtools_systems.campus import CampusOptions, make_campus, read_campus
 from ptmtools_systems.campus.model import HIGHEST_RANK, ICONS
 from ptmtools_systems.campus.records import read_places
+from ptmtools_systems.schemas import CAMPUS
 
 OBJECTS = [("House_1", "House 1"), ("a_b", "a/b")]
 
@@ -68,6 +69,6 @@ def test_impossible_places(tmp_path: Path, table: Any) -> None:
 
 
 def test_the_schema_has_them() -> None:
-    fields = json.loads(schemas.schema_text(schemas.CAMPUS))["$defs"]["object"]["properties"]
+    fields = json.loads(schemas.schema_text(CAMPUS))["$defs"]["object"]["properties"]
     assert tuple(fields["icon"]["enum"]) == ICONS
     assert fields["rank"]["maximum"] == HIGHEST_RANK

@@ -19,6 +19,7 @@ from ptmtools.site.forms import form_site
 from ptmtools_lab.campus.stock import read_stock
 from ptmtools_systems.campus import CampusOptions, make_campus, read_campus
 from ptmtools_systems.campus.records import LARGEST, read_records
+from ptmtools_systems.schemas import CAMPUS
 from tests.conftest import files_below
 
 HOUSE = "<h1>House 1</h1><p>Built in 1903. Größe: 96 m²</p>"
@@ -122,7 +123,7 @@ def test_a_record_elsewhere(copy: Path, file: str) -> None:
     document = json.loads((copy / "campus.json").read_text())
     document["objects"][1]["record"]["file"] = file
     with pytest.raises(schemas.ShapeError):
-        schemas.check(document, schemas.CAMPUS)
+        schemas.check(document, CAMPUS)
 
 
 def test_the_command(

@@ -12,6 +12,7 @@ from PIL import Image
 from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.texture import Description, load_image, write_image
+from ptmtools_systems.schemas import INTERLACE
 from tests.conftest import files_below
 from tests.systems.interlace.folders import image
 
@@ -61,7 +62,7 @@ def test_scaled(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_json(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["interlace", "wall.png", "-o", "wall", "--format", "webp", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
-    schemas.check(report["manifest"], schemas.INTERLACE)
+    schemas.check(report["manifest"], INTERLACE)
     assert report["manifest"] == json.loads(Path("wall/interlace.json").read_text())
     assert report["image_bytes"] == Path("wall.png").stat().st_size
     assert report["notes"] == []

@@ -26,6 +26,7 @@ from ptmtools_systems.interlace import (
 )
 from ptmtools_systems.interlace.containers import CONTAINERS
 from ptmtools_systems.interlace.model import Interlaced
+from ptmtools_systems.schemas import INTERLACE
 from tests.conftest import files_below
 from tests.systems.interlace.folders import SMALL, folder_of, image
 
@@ -182,10 +183,10 @@ def test_the_same_bytes(tmp_path: Path, format: str) -> None:
 def test_the_manifest_is_as_its_schema_says(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "a", image())
     document = json.loads((folder / "interlace.json").read_text())
-    schema = json.loads(schemas.schema_text(schemas.INTERLACE))
+    schema = json.loads(schemas.schema_text(INTERLACE))
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(document, schema)
-    schemas.check(document, schemas.INTERLACE)
+    schemas.check(document, INTERLACE)
     assert schema["$id"] == f"urn:ptmtools:interlace:{document['schema']}"
     assert Interlaced.from_document(document).document() == document
     assert set(schema["required"]) == set(document)
