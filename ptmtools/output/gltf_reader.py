@@ -336,13 +336,8 @@ class _GlbReader:
         coords = extras.get("normalCoords")
         normal_wrap = clamp, clamp
         if coords is not None:
-            normal_wrap = _wrap(
-                {
-                    name: extras[f"normalW{name[1:]}"]
-                    for name in _WRAPS
-                    if f"normalW{name[1:]}" in extras
-                }
-            )
+            keys = {name: f"normalW{name[1:]}" for name in _WRAPS}
+            normal_wrap = _wrap({name: extras[k] for name, k in keys.items() if k in extras})
         normal_map = self._image(material.get("normalTexture"), normal_wrap, place)
         return ReadMaterial(
             factor=tuple(surface.get("baseColorFactor", WHITE)),

@@ -158,9 +158,8 @@ def make_path(
         ways, ahead = _smooth_legs(ground.eye, some, smoother), [leg.looks for leg in some]
         stood = options.stop * random.uniform(*_STANDS, sum(map(len, ahead)))
         legs, looks, stands = legs + ways, looks + ahead, np.append(stands, stood)
-        took = Motion.from_legs(
-            ways, ahead, stood, options.speed
-        ).duration  # without turns between rounds
+        # Without turns between rounds.
+        took = Motion.from_legs(ways, ahead, stood, options.speed).duration
         spent += took
         # In a single room without pictures the walker stays in place.
         if options.duration is None or spent >= options.duration or not took:
