@@ -64,7 +64,7 @@ class Previews(NamedTuple):
         gains[columns > self.column[:, None]] = 0.0
         return np.concatenate([differences, gains])
 
-    def among(self, textures: int) -> Previews:
+    def pad_to(self, textures: int) -> Previews:
         """The same previews of the first of more textures."""
         more = textures + 1 - len(self.first)
         return self._replace(first=np.pad(self.first, (0, more), "edge"))

@@ -47,7 +47,7 @@ from ptmtools.site.client import (
     RECORD_SHARE,
     STREAMS,
 )
-from ptmtools_lab.allocation import allocate, gather, holes, choose_sources
+from ptmtools_lab.allocation import allocate, choose_sources, gather, holes
 from ptmtools_lab.client import Client, FileKind
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.world import World

@@ -103,12 +103,12 @@ def test_rooms_that_cannot_be_reached(
     """Are told, by number."""
     from ptmtools_lab.path.ground import WalkObstacles
 
-    crossed = WalkObstacles.crossed
+    crossed = WalkObstacles.blocks
 
     def walled_up(self, start, end):  # type: ignore[no-untyped-def]
         return crossed(self, start, end) | (start[:, 0] * end[:, 0] <= 0)
 
-    monkeypatch.setattr(WalkObstacles, "crossed", walled_up)
+    monkeypatch.setattr(WalkObstacles, "blocks", walled_up)
     assert main(["path", str(db), "-o", str(tmp_path / "w.json")]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert "1 of 2 rooms" in first
