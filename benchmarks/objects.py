@@ -29,8 +29,8 @@ import numpy as np
 
 from ptmtools.coverage.options import AchOptions
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.stages.scene import ReadingJob
-from ptmtools.pipeline.stages.textures import TEXTURES, TexturesJob
+from ptmtools.pipeline.stages.scene import SceneStage
+from ptmtools.pipeline.stages.textures import TEXTURES, TexturesTurn
 from ptmtools.texture.images.png import png_bytes
 
 WORKERS = (1, 8, 16, 32, 64, 128)
@@ -56,8 +56,8 @@ def main() -> None:
             store.pipe_file(f"benchmark/model/{name}", data)
         scheduler, address = stack.enter_context(cluster(2))
         spent = {"encode": 0.0, "make": 0.0}
-        timed(TexturesJob, "encode", spent)
-        timed(ReadingJob, "make", spent)
+        timed(TexturesTurn, "encode", spent)
+        timed(SceneStage, "make", spent)
         before = cpu_seconds(scheduler.pid)
         build_scene(
             "s3://benchmark/model/hall.obj",

@@ -35,7 +35,7 @@ from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.records import NEVER_RUN, StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor
 from ptmtools.pipeline.stage import Stage
-from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES
+from ptmtools.pipeline.stages import EMIT, STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 from ptmtools.store.objects import is_url
@@ -45,14 +45,6 @@ if TYPE_CHECKING:
     from ptmtools.pipeline.status import StagePlan
 
 
-#: ``--report`` of the stage `PVS`, as ``wanted``.
-report_option = option(
-    "--report",
-    "wanted",
-    is_flag=True,
-    help="Print the sizes of the sets, the most expensive portals, and openings through which an "
-    "unusually large part of the building is visible.",
-)
 #: Textures that are listed without ``-v``.
 SHOWN_TEXTURES = 5
 
@@ -168,16 +160,15 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
         if not (wanted and console.as_json):
             print_report(console, report)
         if wanted:
-            from ptmtools.visibility.report import report as describe, report_lines
-
             with folder_to_build(db) as (folder, remote):
                 database = open_database(folder)
                 database.elsewhere = remote
-                artifacts = Artifacts(database)
-                details = describe(artifacts[CELLS], artifacts[PVS])
-            console.result(asdict(details), report_lines(details, verbose=console.verbose))
+                details, lines = stage.details(Artifacts(database), verbose=console.verbose)
+            console.result(asdict(details), lines)
 
-    return report_option(command) if stage is PVS else command
+    if not stage.details_about:
+        return command
+    return option("--report", "wanted", is_flag=True, help=stage.details_about)(command)
 
 
 @click.command("status", cls=Command)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.pipeline.records import StageReport, parameters
-from ptmtools.pipeline.stage import Job, Options, Stage, changes_of
+from ptmtools.pipeline.stage import Options, Stage, changes_of
 from ptmtools.progress import Progress, silent
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
 
@@ -84,7 +84,7 @@ class Artifacts:
         self.check_recipe(stage)
         arrays = self.db.read_arrays(stage.name)
         with self.reading(arrays_of(stage.name)):
-            return cast(A, stage.job.load(self, stage, arrays))
+            return stage.load(self, arrays)
 
     def check_recipe(self, stage: Stage[Any]) -> None:
         """Raises PTM-D008 if another release of ptmtools ran a stage."""
@@ -151,14 +151,6 @@ class Artifacts:
         except ValueError as fault:
             raise damaged_manifest(self.db.path / MANIFEST, str(fault)) from fault
 
-    def inputs(self, stage: Stage[Any], options: Options) -> dict[str, str]:
-        """Name → SHA-256 of the inputs of a run with these options; raises PTM-D004 and
-        PTM-D002."""
-        if stage.inputs:
-            return dict(stage.inputs(self, options))
-        files = stage.files() if callable(stage.files) else stage.files
-        return self.files_of(stage.sources(options), files)
-
     def files_of(
         self, stages: Iterable[Stage[Any]], files: Collection[Stage[Any]] = ()
     ) -> dict[str, str]:
@@ -201,25 +193,21 @@ class Artifacts:
             options = self.recorded(stage)
             if not stage.read_with(options):  # it reads the model, which may be elsewhere
                 return ""
-            inputs = self.inputs(stage, options)
+            inputs = stage.inputs(self, options)
         except DatabaseError:
             return ""  # the fault is in the stage that it reads
         names = inputs.keys() | record.inputs.keys()
         changed = [name for name in names if record.inputs.get(name) != inputs.get(name)]
-        if not changed:
-            return ""
-        # The inputs of tasks are the tasks.
-        tasks = stage.job.tasks is not Job.tasks
-        return stage.read_with(options)[0].name if tasks else min(changed)
+        return stage.changed_input(changed) if changed else ""
 
     def _check_fit(self, stage: Stage[A], artifact: A) -> None:
         """Raises ValueError if an artifact does not fit those that were read before."""
-        known = {**self._artifacts, stage: artifact}
-        for reader, dependent in known.items():
-            for read, check in reader.fits.items():
-                shown = self._last_change(read)
-                concerned = stage in (reader, shown) and shown in known
-                if concerned and (fault := check(dependent, known[shown])):
+        known: dict[Stage[Any], Any] = {**self._artifacts, stage: artifact}
+        pairs = [(reader, stage) for reader in known] + [(stage, shown) for shown in known]
+        for reader, shown in pairs:
+            for read in filter(None, (shown, shown.changes)):
+                seen = self._last_change(read) is shown
+                if seen and (fault := reader.misfit(known[reader], read, known[shown])):
                     raise ValueError(fault)
 
     @contextmanager
@@ -287,7 +275,7 @@ class Run(Artifacts):
         that has more than such stages, and reports.
 
         An optional stage that has written nothing, and had not, is not reported, unless its counts
-        are `Stage.telling`.
+        tell (`Stage.tells`).
         """
         record = self.record(stage)
         committed = self.db.manifest.stages.get(stage.name)
@@ -296,7 +284,7 @@ class Run(Artifacts):
             self._joint, self._uncommitted = None, {}
             self.writer.provisional &= stage.joined
         idle = not record.outputs and not record.notes and not (committed and committed.outputs)
-        if not (stage.optional and idle) or stage.telling(record.counts):
+        if not (stage.optional and idle) or stage.tells(record.counts):
             notes, warnings = tuple(record.notes), tuple(record.warnings)
             self.reports.append(
                 StageReport(

@@ -19,7 +19,7 @@ from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
 from ptmtools.pipeline.stage import Options, Stage
-from ptmtools.pipeline.stages import EMIT, SCENE, STAGES
+from ptmtools.pipeline.stages import EMIT, STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.layout import MANIFEST
 from ptmtools.store.remote import folder_to_build, model_file
@@ -136,34 +136,34 @@ def _run(
     run.writer.provisional = all(STAGES[name].joined for name in done if name in STAGES) and (
         bool(done) or not (run.db.path / MANIFEST).exists()
     )
-    jobs = [stage.job(run, stage, options[stage]) for stage in stages]
+    turns = [stage.turn(run, options[stage]) for stage in stages]
     shown = run.progress
 
     def progress(done: int, total: int, unit: str) -> None:
-        for job in jobs:
-            job.raise_failure()
+        for turn in turns:
+            turn.raise_failure()
         shown(done, total, unit)
 
     run.progress = progress
     finished: set[Stage[Any]] = set()
     try:
-        for i, job in enumerate(jobs):
-            if job.stage.one_thread and job.planned()[1]:
-                for later in jobs[i + 1 :]:
+        for i, turn in enumerate(turns):
+            if turn.stage.one_thread and turn.planned()[1]:
+                for later in turns[i + 1 :]:
                     if finished.issuperset(later.stage.sources(later.options)):
                         later.begin()
             reported = len(run.reports)
-            job.do()
+            turn.take()
             for report in run.reports[reported:]:
                 tell(report)
-            finished.add(job.stage)
-            if job.stage is SCENE:
-                for later in jobs[i + 1 :]:
-                    later.check_model()
+            finished.add(turn.stage)
+            if i == 0:  # the model has been read
+                for later in turns[1:]:
+                    later.stage.check_model(run, later.options)
     except BaseException:
         with ExitStack() as abandoned:
-            for job in jobs:
-                abandoned.callback(job.abandon)
+            for turn in turns:
+                abandoned.callback(turn.abandon)
         raise
     if run.remote:
         run.remote.commit()

@@ -200,17 +200,17 @@ def _plan(
     there."""
     before = artifacts.before(stage)
     anew = [read.name for read in stage.sources(options) if read in changing]
-    if stage.inputs and anew:  # they may depend on outputs that do not exist yet
+    if stage.opens_inputs and anew:
         inputs = dict(before.inputs) if before else {}
     else:
-        inputs = artifacts.inputs(stage, options)
+        inputs = stage.inputs(artifacts, options)
     work = stage.work(options, inputs)
     why = reasons(stage.name, before, work, artifacts.db, stage.changed)
-    tasks = stage.job.tasks(artifacts, work)
+    tasks = stage.tasks(artifacts, work)
     plan: Plan = "run" if why else "maybe" if anew else "current"
     if plan == "maybe":
         why = (f"if the stage {' or '.join(f'`{name}`' for name in anew)} changes its files",)
-    known = plan == "run" and stage.job.foresee(artifacts, work)
+    known = plan == "run" and stage.foresee(artifacts, work)
     if plan != "current" and not known:
         changing.add(stage)
     return StagePlan(stage.name, plan, why, tuple(Path(name).stem for name in tasks))

@@ -82,7 +82,7 @@ def _check_stage(
         if record.counts.get(name, count) != count:
             message = f"is {record.counts[name]!r}, but the stage has {count!r}"
             findings.add("PTM-D699", MANIFEST, f"stages.{stage.name}.counts.{name}", message)
-    for file, place, message in stage.job.missing(alone, artifact):
+    for file, place, message in stage.missing(alone, artifact):
         findings.add("PTM-D720", file, place, message)
 
 

@@ -21,7 +21,7 @@ from urllib.parse import quote
 from ptmtools.lazy import Lazy, component
 from ptmtools.output.names import plain_name
 from ptmtools.pipeline.artifacts import Artifacts, Run
-from ptmtools.pipeline.stage import Job, SceneOrigin, Stage, described
+from ptmtools.pipeline.stage import Counts, SceneOrigin, Stage, complete
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED, STAGES_FOLDER, arrays_of
@@ -41,81 +41,6 @@ if TYPE_CHECKING:
 
 OCTREE_LIST = f"{STAGES_FOLDER}/octrees.json"
 _FILE = re.compile(rf"{OCTREES.folder}/[A-Za-z0-9_]+\.bin")
-
-
-class ReplacingJob(Job):
-    """Replaces the selected objects."""
-
-    def __init__(self, run: Run, stage: Stage[Scene], options: ReplaceOptions) -> None:
-        """Raises MissingComponentError: PTM-M100 xatlas is not installed, which a later stage
-        needs."""
-        super().__init__(run, stage, options)
-        if options.apo and options.relief == "normal-map":
-            component("xatlas", "PTM-M100", "baking normal maps needs xatlas", "light")
-
-    @staticmethod
-    def load(
-        artifacts: Artifacts, stage: Stage[Any], arrays: Mapping[str, NDArray[np.generic]]
-    ) -> Scene:
-        """See `Job.load`."""
-        from ptmtools_systems.apo.replacing import Replacement
-
-        replacement = Replacement.from_arrays(arrays)
-        numbers = [record.number for record in octree_records(artifacts)]
-        has_list = OCTREE_LIST in artifacts.outputs(APO)
-        if has_list and numbers != replacement.objects.tolist():
-            raise ValueError(f"{arrays_of(APO.name)} and {OCTREE_LIST} are of other objects")
-        return replacement.apply_to(artifacts.original(SCENE))
-
-    @staticmethod
-    def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
-        """The octrees without a file in the database, see `Job.missing`."""
-        outputs = artifacts.outputs(APO)
-        for record in octree_records(artifacts):
-            if f"{SERVED}/{record.file}" not in outputs:
-                yield OCTREE_LIST, record.object, "has no octree in the database"
-
-    @staticmethod
-    def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
-        """See `Job.foresee`: known if nothing was replaced, and nothing will be."""
-        before = artifacts.before(APO)
-        return not work.parameters["apo"] and not (before and before.outputs)
-
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """Raises the errors of `replace_objects`."""
-        if not self.options.apo:
-            return replace(work, counts={"octrees": 0})
-        from ptmtools_systems.apo.replacing import replace_objects
-
-        run = self.run
-        result = replace_objects(
-            run.original(SCENE), self.options, run.workers.executor, run.progress
-        )
-        rows = []
-        files = octree_files(thing.name for thing in result.objects)
-        for file, thing in zip(files, result.objects, strict=True):
-            if thing.octree is not None:
-                row, data = _row(file, thing, thing.octree)
-                rows.append(row)
-                transaction.put(f"{SERVED}/{file}", data)
-        if result.replacement:
-            transaction.put_arrays(APO.name, result.replacement.to_arrays())
-        if rows:
-            text = json.dumps({"octrees": rows}, indent=1, ensure_ascii=False) + "\n"
-            transaction.put(OCTREE_LIST, text.encode())
-            run.cache(OCTREE_LIST, tuple(map(_record, rows)))
-        run.keep(APO, result.scene)
-        counts = {
-            "octrees": len(rows),
-            "objects": len(result.objects),
-            "source": sum(thing.source for thing in result.objects),
-            "faces": sum(thing.faces for thing in result.objects),
-            "texels": sum(sum(row["levels"]) for row in rows),
-            "bytes": sum(row["ends"][-1] for row in rows),
-            "triangles": len(result.scene.triangles),
-            "deviation": max((thing.deviation for thing in result.objects), default=0.0),
-        }
-        return described(work, counts, result.notes)
 
 
 def octree_files(objects: Iterable[str]) -> list[str]:
@@ -138,23 +63,13 @@ def object_stems(objects: Iterable[str]) -> list[str]:
     return stems
 
 
-def replaced_origin(artifacts: Artifacts) -> SceneOrigin:
-    """What the replaced objects come from; raises PTM-D004 to PTM-D006."""
-    from ptmtools_systems.apo.replacing import Replacement
-
-    arrays = artifacts.db.read_arrays(APO.name)
-    with artifacts.reading(arrays_of(APO.name)):
-        replacement = Replacement.from_arrays(arrays)
-    return SceneOrigin(replacement.objects, replacement.sources(artifacts.original(SCENE)))
-
-
 def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str, Any], bytes]:
     """The row of an octree in the list, and its stream."""
     import numpy as np
 
-    from ptmtools_systems.apo.files import encode_stream
+    from ptmtools_systems.apo.files import streamed
 
-    data, levels = encode_stream(octree.texels, octree)
+    data, levels = streamed(octree.texels, octree)
     row = {
         "object": replaced.name,
         "number": replaced.object,
@@ -169,15 +84,6 @@ def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str,
         "missed": replaced.missed,
     }
     return row, data
-
-
-def octree_objects(artifacts: Artifacts) -> Represented:
-    """The objects with octree textures; raises PTM-D004 to PTM-D006."""
-    from ptmtools.output.representation import Represented
-
-    records = octree_records(artifacts)
-    rows = [record.row() for record in records]
-    return Represented(tuple(record.number for record in records), OCTREES, rows)
 
 
 def octree_records(artifacts: Artifacts) -> tuple[OctreeRecord, ...]:
@@ -241,34 +147,114 @@ def _record(row: Mapping[str, Any]) -> OctreeRecord:
     return OctreeRecord(row["object"], number, row["file"], low, side, levels, ends, checks)
 
 
-def _reads(options: ReplaceOptions) -> tuple[Stage[Any], ...]:
-    return (SCENE,) if options.apo else ()
+class ReplacingStage(Stage["Scene"]):
+    """Replaces the selected objects."""
+
+    name = "apo"
+    about = "Replace objects with simplified meshes and their relief."
+    recipe = 3
+    changed = "meshes with many small holes, handles or parts are simplified as far as others"
+    options = ReplaceOptions
+    artifact = Lazy("ptmtools.scene.model:Scene")
+    changes = SCENE
+    represents = True
+    optional = True
+    joined = True
+
+    def read_with(self, options: ReplaceOptions) -> tuple[Stage[Any], ...]:
+        return (SCENE,) if options.apo else ()
+
+    def check_options(self, options: ReplaceOptions) -> None:
+        """Raises MissingComponentError: PTM-M100 xatlas is not installed, which a later stage
+        needs."""
+        if options.apo and options.relief == "normal-map":
+            component("xatlas", "PTM-M100", "baking normal maps needs xatlas", "light")
+
+    def load(self, artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) -> Scene:
+        from ptmtools_systems.apo.replacing import Replacement
+
+        replacement = Replacement.from_arrays(arrays)
+        numbers = [record.number for record in octree_records(artifacts)]
+        has_list = OCTREE_LIST in artifacts.outputs(self)
+        if has_list and numbers != replacement.objects.tolist():
+            raise ValueError(f"{arrays_of(self.name)} and {OCTREE_LIST} are of other objects")
+        return replacement.apply_to(artifacts.original(SCENE))
+
+    def missing(self, artifacts: Artifacts, scene: Scene) -> Iterator[tuple[str, str, str]]:
+        """The octrees without a file in the database."""
+        outputs = artifacts.outputs(self)
+        for record in octree_records(artifacts):
+            if f"{SERVED}/{record.file}" not in outputs:
+                yield OCTREE_LIST, record.object, "has no octree in the database"
+
+    def foresee(self, artifacts: Artifacts, work: StageRecord) -> bool:
+        """Known if nothing was replaced, and nothing will be."""
+        before = artifacts.before(self)
+        return not work.parameters["apo"] and not (before and before.outputs)
+
+    def make(
+        self, run: Run, options: ReplaceOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord:
+        """Raises the errors of `replace_objects`."""
+        if not options.apo:
+            return replace(work, counts={"octrees": 0})
+        from ptmtools_systems.apo.replacing import replace_objects
+
+        result = replace_objects(run.original(SCENE), options, run.workers.executor, run.progress)
+        rows = []
+        files = octree_files(thing.name for thing in result.objects)
+        for file, thing in zip(files, result.objects, strict=True):
+            if thing.octree is not None:
+                row, data = _row(file, thing, thing.octree)
+                rows.append(row)
+                transaction.put(f"{SERVED}/{file}", data)
+        if result.replacement:
+            transaction.put_arrays(self.name, result.replacement.to_arrays())
+        if rows:
+            text = json.dumps({"octrees": rows}, indent=1, ensure_ascii=False) + "\n"
+            transaction.put(OCTREE_LIST, text.encode())
+            run.cache(OCTREE_LIST, tuple(map(_record, rows)))
+        run.keep(self, result.scene)
+        counts = {
+            "octrees": len(rows),
+            "objects": len(result.objects),
+            "source": sum(thing.source for thing in result.objects),
+            "faces": sum(thing.faces for thing in result.objects),
+            "texels": sum(sum(row["levels"]) for row in rows),
+            "bytes": sum(row["ends"][-1] for row in rows),
+            "triangles": len(result.scene.triangles),
+            "deviation": max((thing.deviation for thing in result.objects), default=0.0),
+        }
+        return complete(work, counts, result.notes)
+
+    def counts(self, scene: Scene) -> Counts:
+        return {"triangles": len(scene.triangles)}
+
+    def summary(self, n: Counts) -> str:
+        if not (objects := n.get("objects")):
+            return "no object replaced"
+        octrees = f"; {count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
+        return (
+            f"{count(objects, 'object')} of {count(n['source'], 'triangle')} → {n['faces']:,}, "
+            f"error about {n['deviation']:.2g} m{octrees if n['octrees'] else ''}"
+        )
+
+    def origin(self, artifacts: Artifacts) -> SceneOrigin:
+        """What the replaced objects come from; raises PTM-D004 to PTM-D006."""
+        from ptmtools_systems.apo.replacing import Replacement
+
+        arrays = artifacts.db.read_arrays(self.name)
+        with artifacts.reading(arrays_of(self.name)):
+            replacement = Replacement.from_arrays(arrays)
+        return SceneOrigin(replacement.objects, replacement.sources(artifacts.original(SCENE)))
+
+    def represented(self, artifacts: Artifacts) -> Represented:
+        """The objects with octree textures; raises PTM-D004 to PTM-D006."""
+        from ptmtools.output.representation import Represented
+
+        records = octree_records(artifacts)
+        rows = [record.row() for record in records]
+        return Represented(tuple(record.number for record in records), OCTREES, rows)
 
 
-def _summary(n: Mapping[str, Any]) -> str:
-    if not (objects := n.get("objects")):
-        return "no object replaced"
-    octrees = f"; {count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
-    return (
-        f"{count(objects, 'object')} of {count(n['source'], 'triangle')} → {n['faces']:,}, "
-        f"error about {n['deviation']:.2g} m{octrees if n['octrees'] else ''}"
-    )
-
-
-APO: Stage[Scene] = Stage(
-    name="apo",
-    about="Replace objects with simplified meshes and their relief.",
-    recipe=3,
-    options=ReplaceOptions,
-    changed="meshes with many small holes, handles or parts are simplified as far as others",
-    reads=_reads,
-    changes=SCENE,
-    origin=Lazy(f"{__name__}:replaced_origin"),
-    representation=Lazy(f"{__name__}:octree_objects"),
-    artifact=Lazy("ptmtools.scene.model:Scene"),
-    counts=lambda scene: {"triangles": len(scene.triangles)},
-    summary=_summary,
-    job=ReplacingJob,
-    optional=True,
-    joined=True,
-)
+APO = ReplacingStage()

@@ -6,14 +6,14 @@ of the textures, and clients fetch them like textures.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.artifacts import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
-from ptmtools.pipeline.stage import Job, Stage, described
+from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.scene import SCENE, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
@@ -22,11 +22,10 @@ from ptmtools_systems.stages.apo import APO, object_stems
 if TYPE_CHECKING:
     from ptmtools.output.object_maps import ObjectMaps
     from ptmtools.output.representation import Represented
-    from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools_systems.apo.normal_map import NormalMap
-    from ptmtools_systems.apo.replacing import Replacing
+    from ptmtools_systems.apo.reliefs import Replacing
 
 #: A greater share of texels whose rays miss the original is reported.
 _MISSED = 0.01
@@ -47,37 +46,11 @@ class Mapped:
     options: TextureOptions
 
 
-def bake_map(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
+def mapped(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
     """The normal map of an object, and its files as `encoded_image` returns them."""
     number, stem = task
     relief = shared.replacing.normal_map(number)
     return relief, encoded_texels(shared.options, stem, relief.texels)
-
-
-class ReliefJob(Job):
-    """Bakes the normal maps of all replaced objects."""
-
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
-        run = self.run
-        objects = scene_origin(run).objects
-        if not len(objects) or run.recorded(APO).relief != "normal-map":
-            return described(work, {"maps": 0}, ())
-        from ptmtools_systems.apo.replacing import Replacing, apo_options, object_maps
-
-        # Workers need no images.
-        scene, shown = replace(run.original(SCENE), images=()), replace(run[APO], images=())
-        replacing = Replacing(scene, shown, apo_options(run.recorded(APO)))
-        names = [shown.objects[number] for number in objects.tolist()]
-        tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
-        shared = Mapped(replacing, run.recorded(TEXTURES))
-        maps, total = baked(run, transaction, bake_map, shared, tasks, "normal maps")
-        notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
-        reliefs = object_maps(shown, objects, maps)
-        run.keep(RELIEF, reliefs)
-        transaction.put_arrays(RELIEF.name, reliefs.to_arrays())
-        error = max(relief.error for relief in maps)
-        return described(work, {**_counts(reliefs), "error": error, "ptm_bytes": total}, notes)
 
 
 def _notes(name: str, relief: NormalMap) -> Iterator[str]:
@@ -100,64 +73,84 @@ def relief_files(artifacts: Artifacts, reliefs: ObjectMaps | None) -> dict[int, 
     return dict(zip(numbers, map(ptm_file, relief_stems(names)), strict=True))
 
 
-def relief_objects(artifacts: Artifacts) -> Represented | None:
-    """The objects with normal maps; None without any."""
-    from ptmtools.output.representation import Represented
-    from ptmtools.pipeline.stages.emit import read_records
+class ReliefStage(Stage["ObjectMaps"]):
+    """Bakes the normal maps of all replaced objects."""
 
-    reliefs = artifacts.stored(RELIEF)
-    if reliefs is None:
-        return None
-    files = relief_files(artifacts, reliefs)
-    owners = ((name, {"image": -1, "object": number}) for number, name in files.items())
-    textures = read_records(artifacts, RELIEF, owners)
-    return Represented(tuple(reliefs.objects.tolist()), maps=reliefs, textures=textures)
+    name = "relief"
+    about = "Bake the normals of replaced objects into normal maps."
+    recipe = 1
+    options = ReliefOptions
+    reads = (SCENE,)
+    heeds = (APO, TEXTURES)
+    artifact = Lazy("ptmtools.output.object_maps:ObjectMaps")
+    represents = True
+    optional = True
+    opens_inputs = True
+
+    def inputs(self, artifacts: Artifacts, options: ReliefOptions) -> dict[str, str]:
+        replacing = artifacts.chosen.get(APO) or artifacts.recorded(APO)
+        if not replacing.apo or replacing.relief != "normal-map":
+            return {}
+        return artifacts.files_of(self.sources(options)) | artifacts.choices(self)
+
+    def make(
+        self, run: Run, options: ReliefOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord:
+        """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
+        objects = scene_origin(run).objects
+        if not len(objects) or run.recorded(APO).relief != "normal-map":
+            return complete(work, {"maps": 0}, ())
+        from ptmtools_systems.apo.reliefs import Replacing, object_maps
+        from ptmtools_systems.apo.replacing import apo_options
+
+        # Workers need no images.
+        scene, shown = replace(run.original(SCENE), images=()), replace(run[APO], images=())
+        replacing = Replacing(scene, shown, apo_options(run.recorded(APO)))
+        names = [shown.objects[number] for number in objects.tolist()]
+        tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
+        shared = Mapped(replacing, run.recorded(TEXTURES))
+        maps, total = baked(run, transaction, mapped, shared, tasks, "normal maps")
+        notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
+        reliefs = object_maps(shown, objects, maps)
+        run.keep(self, reliefs)
+        transaction.put_arrays(self.name, reliefs.to_arrays())
+        error = max(relief.error for relief in maps)
+        return complete(work, {**self.counts(reliefs), "error": error, "ptm_bytes": total}, notes)
+
+    def counts(self, reliefs: ObjectMaps) -> Counts:
+        return {
+            "maps": len(reliefs.objects),
+            "texels": int((reliefs.side.astype("int64") ** 2).sum()),
+        }
+
+    def summary(self, n: Counts) -> str:
+        if not n["maps"]:
+            return "no object replaced by one with a normal map"
+        return (
+            f"{count(n['maps'], 'normal map')} of {count(n['texels'], 'texel')}, "
+            f"{size(n['ptm_bytes'])}, normals off by {n['error']:.2g} at most"
+        )
+
+    def misfit(self, reliefs: ObjectMaps, source: Stage[Any], contents: Any) -> str:
+        import numpy as np
+
+        if source is not APO:
+            return ""
+        mapped = np.isin(contents.triangle_object, reliefs.objects).sum()
+        return "" if mapped == len(reliefs.uv) else "the normal maps are those of other objects"
+
+    def represented(self, artifacts: Artifacts) -> Represented | None:
+        """The objects with normal maps; None without any."""
+        from ptmtools.output.representation import Represented
+        from ptmtools.pipeline.stages.emit import read_records
+
+        reliefs = artifacts.stored(self)
+        if reliefs is None:
+            return None
+        files = relief_files(artifacts, reliefs)
+        owners = ((name, {"image": -1, "object": number}) for number, name in files.items())
+        textures = read_records(artifacts, self, owners)
+        return Represented(tuple(reliefs.objects.tolist()), maps=reliefs, textures=textures)
 
 
-def _inputs(artifacts: Artifacts, options: ReliefOptions) -> dict[str, str]:
-    """See `Stage.inputs`."""
-    replacing = artifacts.chosen.get(APO) or artifacts.recorded(APO)
-    if not replacing.apo or replacing.relief != "normal-map":
-        return {}
-    return artifacts.files_of(RELIEF.sources(options)) | artifacts.choices(RELIEF)
-
-
-def _counts(reliefs: ObjectMaps) -> Mapping[str, Any]:
-    return {
-        "maps": len(reliefs.objects),
-        "texels": int((reliefs.side.astype("int64") ** 2).sum()),
-    }
-
-
-def _summary(n: Mapping[str, Any]) -> str:
-    if not n["maps"]:
-        return "no object replaced by one with a normal map"
-    return (
-        f"{count(n['maps'], 'normal map')} of {count(n['texels'], 'texel')}, "
-        f"{size(n['ptm_bytes'])}, normals off by {n['error']:.2g} at most"
-    )
-
-
-def _fits_scene(reliefs: ObjectMaps, scene: Scene) -> str:
-    import numpy as np
-
-    mapped = np.isin(scene.triangle_object, reliefs.objects).sum()
-    return "" if mapped == len(reliefs.uv) else "the normal maps are those of other objects"
-
-
-RELIEF: Stage[ObjectMaps] = Stage(
-    name="relief",
-    about="Bake the normals of replaced objects into normal maps.",
-    recipe=1,
-    options=ReliefOptions,
-    reads=(SCENE,),
-    representation=Lazy(f"{__name__}:relief_objects"),
-    inputs=_inputs,
-    heeds=(APO, TEXTURES),
-    artifact=Lazy("ptmtools.output.object_maps:ObjectMaps"),
-    counts=_counts,
-    summary=_summary,
-    fits={APO: _fits_scene},
-    job=ReliefJob,
-    optional=True,
-)
+RELIEF = ReliefStage()

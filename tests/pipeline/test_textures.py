@@ -18,7 +18,6 @@ from ptmtools.pipeline.artifacts import Run
 from ptmtools.pipeline.build import build_scene, run_stage
 from ptmtools.pipeline.encoding import TextureOptions
 from ptmtools.pipeline.stages import CELLS, TEXTURES
-from ptmtools.pipeline.stages.textures import TexturesJob
 from ptmtools.store.writer import DatabaseWriter
 from ptmtools.texture import read_image
 from ptmtools.texture.images.bare import bare
@@ -51,13 +50,13 @@ def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
     with DatabaseWriter.open_for_stage(tmp_path / "db") as writer, Workers(1, None) as workers:
         run = Run(writer, workers, lambda done, *_: stop.set() if done == 1 else None)
         stop = Event()
-        job = TexturesJob(run, TEXTURES, TextureOptions())
-        job.begin()
-        images = job.left
-        job.encode(Executor(), stop)
-        assert 0 < job.left < images
-        job.do()
-        assert job.left == 0
+        turn = TEXTURES.turn(run, TextureOptions())
+        turn.begin()
+        images = turn.left
+        turn.encode(Executor(), stop)
+        assert 0 < turn.left < images
+        turn.take()
+        assert turn.left == 0
         assert run.reports[0].tasks == (images, 0, 0)
         assert run.record(TEXTURES).counts["textures"] == images
 

@@ -48,23 +48,32 @@ class Volumes:
         return Volumes(arrays["volume"])
 
 
-def measure(cells: Cells, options: ToyOptions, progress: object, executor: object) -> Volumes:
-    return Volumes(options.toy_factor * cells.leaf_volumes())
+class ToyStage(Stage[Volumes]):
+    name = "toy"
+    about = "Measure the leaves."
+    recipe = 1
+    options = ToyOptions
+    reads = (CELLS,)
+    artifact = Lazy(f"{__name__}:Volumes")
+
+    def compute(self, cells: Cells, options: ToyOptions, *_: object) -> Volumes:
+        return Volumes(options.toy_factor * cells.leaf_volumes())
+
+    def counts(self, volumes: Volumes) -> dict[str, float]:
+        return {"volume": float(volumes.volume.sum())}
+
+    def notes(self, volumes: Volumes, options: ToyOptions) -> list[str]:
+        return [f"multiplied by {options.toy_factor:g}"]
+
+    def summary(self, counts: Mapping[str, Any]) -> str:
+        return f"{counts['volume']:.1f} m³"
+
+    def misfit(self, volumes: Volumes, source: Stage[Any], contents: Any) -> str:
+        foreign = source is CELLS and len(volumes.volume) != contents.leaf_count
+        return "of other leaves" if foreign else ""
 
 
-TOY: Stage[Volumes] = Stage(
-    name="toy",
-    about="Measure the leaves.",
-    recipe=1,
-    options=ToyOptions,
-    reads=(CELLS,),
-    artifact=Lazy(f"{__name__}:Volumes"),
-    compute=Lazy(f"{__name__}:measure"),
-    counts=lambda made: {"volume": float(made.volume.sum())},
-    notes=lambda made, options: [f"multiplied by {options.toy_factor:g}"],
-    summary=lambda n: f"{n['volume']:.1f} m³",
-    fits={CELLS: lambda a, b: "" if len(a.volume) == b.leaf_count else "of other leaves"},
-)
+TOY = ToyStage()
 
 
 @pytest.fixture(autouse=True)

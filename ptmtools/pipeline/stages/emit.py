@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools import plugins
 from ptmtools.output.options import EmitOptions
-from ptmtools.pipeline.artifacts import Artifacts
+from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import (
     fallback_level,
     fallback_preview,
     preview_file,
     stem_of,
 )
-from ptmtools.pipeline.stage import Job, Stage, described
+from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.light import LIGHT, lightmap_files
@@ -41,68 +41,6 @@ if TYPE_CHECKING:
     from ptmtools.texture.sources import PtmSource
 
 
-class EmissionJob(Job):
-    """Writes the served files; raises as `ptmtools.output.emit`."""
-
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """See `Job.make`."""
-        from ptmtools.output import EmitExtras, emit
-        from ptmtools.output.representation import object_maps
-
-        run, light, scene = self.run, self.run.stored(LIGHT), self.run[SCENE]
-        images = texture_records(run)
-        represented = tuple(_represented(run))
-        maps = tuple(texture for kind in represented for texture in kind.textures)
-        places = object_maps(represented)
-        textures = (*images, *lightmap_records(run, light), *maps)
-        extras = EmitExtras(
-            light=light,
-            represented=represented,
-            need=self._need(scene, {record.image: record for record in images}),
-            map_need=self._need(places.scene_with_maps(scene), dict(enumerate(maps)))
-            if places
-            else None,
-            force=True,
-            progress=run.progress,
-            workers=run.workers.executor.workers,
-        )
-        report = emit(
-            scene,
-            run[CELLS],
-            run[PVS],
-            run[ACH],
-            textures,
-            transaction.subfolder(SERVED),
-            self.options,
-            extras,
-        )
-        for name in report.files:
-            transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
-        counts = {
-            "files": len(report.files),
-            "bytes": report.bytes,
-            "first_look": report.first_look,
-            "shapes": report.shapes,
-            "triangles": report.triangles,
-            "visible": run[CELLS].visible,
-            "owners": run[CELLS].owners,
-            "collapsed": report.collapsed,
-            "viewpoints": len(report.viewpoints),
-            "visit": asdict(report.visit),
-        }
-        return described(work, counts, report.notes)
-
-    def _need(self, scene: Scene, textures: Mapping[int, TextureRecord]) -> Need | None:
-        """The required levels of the textures of a scene's images, if the options ask for them."""
-        if not self.options.need:
-            return None
-        from ptmtools.coverage.required_levels import TextureSize, compute_need
-
-        run = self.run
-        sizes = {image: TextureSize(*t.finest, t.level_count) for image, t in textures.items()}
-        return compute_need(scene, run[CELLS], run[PVS], sizes, self.options.need, run.progress)
-
-
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """The textures of the scene's images, for the served files."""
     files = texture_files(image_digests(run))
@@ -120,13 +58,24 @@ def lightmap_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord
 def representing() -> tuple[Stage[Any], ...]:
     """The stages of other packages that add representations of objects."""
     declared = plugins.declarations("stages", Stage).values()
-    return tuple(stage for stage in declared if stage.representation)
+    return tuple(stage for stage in declared if stage.represents)
+
+
+def _need(
+    run: Run, options: EmitOptions, scene: Scene, textures: Mapping[int, TextureRecord]
+) -> Need | None:
+    """The required levels of the textures of a scene's images, if the options ask for them."""
+    if not options.need:
+        return None
+    from ptmtools.coverage.required_levels import TextureSize, compute_need
+
+    sizes = {image: TextureSize(*t.finest, t.level_count) for image, t in textures.items()}
+    return compute_need(scene, run[CELLS], run[PVS], sizes, options.need, run.progress)
 
 
 def _represented(run: Artifacts) -> Iterator[Represented]:
     for stage in representing():
-        assert stage.representation
-        if represented := stage.representation.load()(run):
+        if represented := stage.represented(run):
             yield represented
 
 
@@ -180,30 +129,87 @@ def read_records(
     return tuple(map_in_order(one, files, OBJECTS_AHEAD))
 
 
-def _summary(n: Mapping[str, Any]) -> str:
-    looks = n.get("first_look")
-    bundles = f" ({size(looks)} of first-look bundles)" if looks else ""
-    return (
-        f"{count(n['files'], 'file')}, {size(n['bytes'])}{bundles}; "
-        f"{count(n['triangles'], 'triangle')} in all cells, from {n['visible']:,} of the model "
-        f"({n['owners']:,} if none were cut at cell boundaries), "
-        f"{count(n['viewpoints'], 'viewpoint')}"
+class EmitStage(Stage[None]):
+    """Writes the served files."""
+
+    name = "emit"
+    about = "Write the served files: cells and hints."
+    recipe = 13
+    changed = (
+        "portals that door leaves cover are marked as passages; GLBs are compressed; the "
+        "hints hold the previews of textures, the errors and the "
+        "effect of each texture level, mean colours, GPU sizes of texels, and the resolution "
+        "needed in each cell; --first-look writes a bundle of coarse levels for each cell; "
+        "viewpoints face pictures; hulls with slivers and portals with short edges are convex in "
+        "float32 and float64; objects with thousands of triangles have levels of detail"
     )
+    options = EmitOptions
+
+    def read_with(self, options: EmitOptions) -> tuple[Stage[Any], ...]:
+        return (SCENE, CELLS, PVS, ACH, TEXTURES, *representing(), LIGHT)
+
+    def inputs(self, artifacts: Artifacts, options: EmitOptions) -> dict[str, str]:
+        return artifacts.files_of(self.sources(options), (LIGHT, *representing()))
+
+    def make(
+        self, run: Run, options: EmitOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord:
+        """Raises as `ptmtools.output.emit`."""
+        from ptmtools.output import EmitExtras, emit
+        from ptmtools.output.representation import object_maps
+
+        light, scene = run.stored(LIGHT), run[SCENE]
+        images = texture_records(run)
+        represented = tuple(_represented(run))
+        maps = tuple(texture for kind in represented for texture in kind.textures)
+        places = object_maps(represented)
+        textures = (*images, *lightmap_records(run, light), *maps)
+        extras = EmitExtras(
+            light=light,
+            represented=represented,
+            need=_need(run, options, scene, {record.image: record for record in images}),
+            map_need=_need(run, options, places.scene_with_maps(scene), dict(enumerate(maps)))
+            if places
+            else None,
+            force=True,
+            progress=run.progress,
+            workers=run.workers.executor.workers,
+        )
+        report = emit(
+            scene,
+            run[CELLS],
+            run[PVS],
+            run[ACH],
+            textures,
+            transaction.subfolder(SERVED),
+            options,
+            extras,
+        )
+        for name in report.files:
+            transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
+        counts = {
+            "files": len(report.files),
+            "bytes": report.bytes,
+            "first_look": report.first_look,
+            "shapes": report.shapes,
+            "triangles": report.triangles,
+            "visible": run[CELLS].visible,
+            "owners": run[CELLS].owners,
+            "collapsed": report.collapsed,
+            "viewpoints": len(report.viewpoints),
+            "visit": asdict(report.visit),
+        }
+        return complete(work, counts, report.notes)
+
+    def summary(self, n: Counts) -> str:
+        looks = n.get("first_look")
+        bundles = f" ({size(looks)} of first-look bundles)" if looks else ""
+        return (
+            f"{count(n['files'], 'file')}, {size(n['bytes'])}{bundles}; "
+            f"{count(n['triangles'], 'triangle')} in all cells, from {n['visible']:,} of the model "
+            f"({n['owners']:,} if none were cut at cell boundaries), "
+            f"{count(n['viewpoints'], 'viewpoint')}"
+        )
 
 
-EMIT: Stage[None] = Stage(
-    name="emit",
-    about="Write the served files: cells and hints.",
-    recipe=13,
-    changed="portals that door leaves cover are marked as passages; GLBs are compressed; the "
-    "hints hold the previews of textures, the errors and the "
-    "effect of each texture level, mean colours, GPU sizes of texels, and the resolution needed in "
-    "each cell; --first-look writes a bundle of coarse levels for each cell; viewpoints face "
-    "pictures; hulls with slivers and portals with short edges are convex in float32 and float64; "
-    "objects with thousands of triangles have levels of detail",
-    options=EmitOptions,
-    reads=lambda options: (SCENE, CELLS, PVS, ACH, TEXTURES, *representing(), LIGHT),
-    files=lambda: (LIGHT, *representing()),
-    summary=_summary,
-    job=EmissionJob,
-)
+EMIT = EmitStage()

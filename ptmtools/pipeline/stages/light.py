@@ -18,7 +18,7 @@ from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
 from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
-from ptmtools.pipeline.stage import Job, Stage, described
+from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ptmtools.cells.model import Cells
     from ptmtools.light.cells import CellLight, LightBaking
     from ptmtools.light.looks import PaintedLight
     from ptmtools.light.model import CellSurfaces, Light
@@ -78,100 +77,25 @@ def lightmap_stem(cell: int) -> str:
 _NO_LIGHT = {"lightmaps": 0, "light": "none"}
 
 
-class LightJob(Job):
-    """Bakes the light of all cells."""
+def _baking(
+    run: Run,
+    options: LightOptions,
+    own: Lights | None,
+    lights: Lights | None,
+    pieces: list[CellSurfaces],
+) -> LightBaking:
+    """What the tasks share: the light of the model, or lamps and the sky."""
+    from ptmtools.light.cells import ABOVE, WHITE, LightBaking
+    from ptmtools.light.lamps import lamps_of
+    from ptmtools.light.mixing import light_mix
+    from ptmtools.light.occlusion import Occluders
 
-    def __init__(self, run: Run, stage: Stage[Light], options: LightOptions) -> None:
-        """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
-        super().__init__(run, stage, options)
-        if options.light in ("bake", "model"):
-            _check_component()
-
-    def check_model(self) -> None:
-        """Raises InputError PTM-I701: the model has no lightmaps, which the options ask for."""
-        if self.options.light != "model":
-            return
-        lights = lights_of(self.run)
-        if lights is None or not lights.maps:
-            raise InputError(
-                "PTM-I701",
-                "the model has no lightmaps",
-                file=self.run.model or self.run.db.path,
-                remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
-            )
-
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """Raises as `check_model`."""
-        self.check_model()
-        run = self.run
-        lights = None if self.options.light == "none" else lights_of(run)
-        has_maps = lights is not None and bool(lights.maps)
-        if self.options.light == "none":
-            return described(work, _NO_LIGHT, ())
-        import numpy as np
-
-        from ptmtools.light.cells import LEAST, affordable_density, expected_bytes, round_bytes
-        from ptmtools.light.model import Light
-        from ptmtools.output.geometry import Geometry
-        from ptmtools.output.pieces import pieces_of
-
-        scene, cells = run[SCENE], run[CELLS]
-        own = lights if has_maps and self.options.light != "bake" else None
-        unlit = unlit_materials(scene, lights, painted=own is not None)
-        options, texel = self.options, 1 / self.options.light_density
-        pieces = pieces_of(Geometry(scene, cells), cells, unlit, texel, scene_origin(run).objects)
-        if options.light == "auto" and not own:
-            density = affordable_density(
-                pieces, options.light_density, round_bytes(image_bytes(run))
-            )
-            if not density:
-                least = round(expected_bytes(pieces, LEAST * options.light_density))
-                return described(work, {**_NO_LIGHT, "too_many_bytes": least}, ())
-            options = replace(options, light_density=density)
-        if options.light == "auto":
-            try:
-                _check_component()
-            except MissingComponentError as fault:
-                left_out = f"lightmaps are left out: {fault.message}"
-                remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
-                work = replace(work, inputs={**work.inputs, _ABSENT: ""})
-                return described(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
-        baking = self._baking(options, own, lights, pieces)
-        shared = LitCells(baking, run.recorded(TEXTURES))
-        tasks = list(enumerate(pieces))
-        cell_lights, total = baked(run, transaction, lit, shared, tasks, "light")
-        artifact = Light(
-            np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
-            np.concatenate([light.mapped for light in cell_lights]),
-            np.concatenate([light.uv for light in cell_lights]),
-            np.concatenate([light.vertex for light in cell_lights]),
-        )
-        run.keep(LIGHT, artifact)
-        transaction.put_arrays(LIGHT.name, artifact.to_arrays())
-        counts = {**_counts(artifact), "ptm_bytes": total, **_about(shared.baking)}
-        if options.light_density < self.options.light_density:
-            counts["reduced_density"] = options.light_density
-        return described(work, counts, _notes(cell_lights))
-
-    def _baking(
-        self,
-        options: LightOptions,
-        own: Lights | None,
-        lights: Lights | None,
-        pieces: list[CellSurfaces],
-    ) -> LightBaking:
-        """What the tasks share: the light of the model, or lamps and the sky."""
-        from ptmtools.light.cells import ABOVE, WHITE, LightBaking
-        from ptmtools.light.lamps import lamps_of
-        from ptmtools.light.mixing import light_mix
-        from ptmtools.light.occlusion import Occluders
-
-        scene = self.run[SCENE]
-        around = Occluders.from_scene(scene)
-        if own:
-            return LightBaking(around, options, painted=_painted(self.run, own))
-        lamps = lamps_of(scene, lights)
-        return LightBaking(around, options, light_mix(around, pieces, lamps, options, ABOVE, WHITE))
+    scene = run[SCENE]
+    around = Occluders.from_scene(scene)
+    if own:
+        return LightBaking(around, options, painted=_painted(run, own))
+    lamps = lamps_of(scene, lights)
+    return LightBaking(around, options, light_mix(around, pieces, lamps, options, ABOVE, WHITE))
 
 
 def _check_component() -> None:
@@ -244,78 +168,143 @@ def lightmap_files(light: Light | None) -> dict[int, str]:
     return {cell: ptm_file(lightmap_stem(cell)) for cell, side in enumerate(sides) if side}
 
 
-def _reads(options: LightOptions) -> tuple[Stage[Any], ...]:
-    return () if options.light == "none" else (SCENE, CELLS)
+class LightStage(Stage["Light"]):
+    """Bakes the light of all cells."""
 
-
-def _inputs(artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
-    """See `Stage.inputs`."""
-    name = arrays_of(LIGHTS)
-    digest = artifacts.outputs(SCENE).get(name)
-    if options.light == "none":
-        return {}
-    lights = {} if digest is None else {name: digest}
-    if options.light == "auto":
-        from ptmtools.light.cells import round_bytes
-
-        lights[_IMAGES] = sha256(str(round_bytes(image_bytes(artifacts))).encode())
-    before = artifacts.before(LIGHT)
-    if before and _ABSENT in before.inputs and options.light == "auto" and not _has_component():
-        lights[_ABSENT] = ""
-    return lights | artifacts.files_of(LIGHT.sources(options)) | artifacts.choices(LIGHT)
-
-
-def _counts(light: Light) -> Mapping[str, Any]:
-    return {
-        "lightmaps": int((light.side > 0).sum()),
-        "texels": int((light.side.astype("int64") ** 2).sum()),
-    }
-
-
-def _summary(n: Mapping[str, Any]) -> str:
-    if not n["lightmaps"]:
-        if not n.get("too_many_bytes"):
-            return "no light"
-        least = size(n["too_many_bytes"])
-        return (
-            f"no light: lightmaps would add {least} or more, too much beside the images "
-            "(--light bake adds them)"
-        )
-    reduced = n.get("reduced_density", 0.0)
-    parts = [("of the model", n.get("light") == "model"), ("with lamps", n.get("lamps")),
-             ("with the sky", n.get("sky")),
-             (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced)]  # fmt: skip
-    return (
-        f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
-        f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
-    )
-
-
-def _telling(n: Mapping[str, Any]) -> bool:
-    return bool(n.get("too_many_bytes"))
-
-
-def _fits_cells(light: Light, cells: Cells) -> str:
-    return "" if len(light.side) == cells.cell_count else "the light belongs to other cells"
-
-
-LIGHT: Stage[Light] = Stage(
-    name="light",
-    about="Bake the light of the surfaces into lightmaps.",
-    recipe=4,
-    changed=(
+    name = "light"
+    about = "Bake the light of the surfaces into lightmaps."
+    recipe = 4
+    changed = (
         "light is baked by default if it costs little beside the images, and light at vertices "
         "takes half of the rays"
-    ),
-    options=LightOptions,
-    reads=_reads,
-    inputs=_inputs,
-    heeds=(TEXTURES,),
-    artifact=Lazy("ptmtools.light.model:Light"),
-    counts=_counts,
-    summary=_summary,
-    fits={CELLS: _fits_cells},
-    job=LightJob,
-    optional=True,
-    telling=_telling,
-)
+    )
+    options = LightOptions
+    heeds = (TEXTURES,)
+    artifact = Lazy("ptmtools.light.model:Light")
+    optional = True
+    opens_inputs = True
+
+    def read_with(self, options: LightOptions) -> tuple[Stage[Any], ...]:
+        return () if options.light == "none" else (SCENE, CELLS)
+
+    def inputs(self, artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
+        name = arrays_of(LIGHTS)
+        digest = artifacts.outputs(SCENE).get(name)
+        if options.light == "none":
+            return {}
+        lights = {} if digest is None else {name: digest}
+        if options.light == "auto":
+            from ptmtools.light.cells import round_bytes
+
+            lights[_IMAGES] = sha256(str(round_bytes(image_bytes(artifacts))).encode())
+        before = artifacts.before(self)
+        if before and _ABSENT in before.inputs and options.light == "auto" and not _has_component():
+            lights[_ABSENT] = ""
+        return lights | artifacts.files_of(self.sources(options)) | artifacts.choices(self)
+
+    def check_options(self, options: LightOptions) -> None:
+        """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
+        if options.light in ("bake", "model"):
+            _check_component()
+
+    def check_model(self, run: Run, options: LightOptions) -> None:
+        """Raises InputError PTM-I701: the model has no lightmaps, which the options ask for."""
+        if options.light != "model":
+            return
+        lights = lights_of(run)
+        if lights is None or not lights.maps:
+            raise InputError(
+                "PTM-I701",
+                "the model has no lightmaps",
+                file=run.model or run.db.path,
+                remedy="use --light bake, or a glTF with occlusion textures that do not repeat",
+            )
+
+    def make(
+        self, run: Run, options: LightOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord:
+        """Raises as `check_model`."""
+        if options.light == "none":
+            return complete(work, _NO_LIGHT, ())
+        self.check_model(run, options)
+        import numpy as np
+
+        from ptmtools.light.cells import LEAST, affordable_density, expected_bytes, round_bytes
+        from ptmtools.light.model import Light
+        from ptmtools.output.geometry import Geometry
+        from ptmtools.output.pieces import pieces_of
+
+        scene, cells = run[SCENE], run[CELLS]
+        lights = lights_of(run)
+        own = lights if lights and lights.maps and options.light != "bake" else None
+        unlit = unlit_materials(scene, lights, painted=own is not None)
+        asked = options.light_density
+        replaced = scene_origin(run).objects
+        pieces = pieces_of(Geometry(scene, cells), cells, unlit, 1 / asked, replaced)
+        if options.light == "auto" and not own:
+            density = affordable_density(pieces, asked, round_bytes(image_bytes(run)))
+            if not density:
+                least = round(expected_bytes(pieces, LEAST * asked))
+                return complete(work, {**_NO_LIGHT, "too_many_bytes": least}, ())
+            options = replace(options, light_density=density)
+        if options.light == "auto":
+            try:
+                _check_component()
+            except MissingComponentError as fault:
+                left_out = f"lightmaps are left out: {fault.message}"
+                remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
+                work = replace(work, inputs={**work.inputs, _ABSENT: ""})
+                return complete(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
+        baking = _baking(run, options, own, lights, pieces)
+        shared = LitCells(baking, run.recorded(TEXTURES))
+        tasks = list(enumerate(pieces))
+        cell_lights, total = baked(run, transaction, lit, shared, tasks, "light")
+        artifact = Light(
+            np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
+            np.concatenate([light.mapped for light in cell_lights]),
+            np.concatenate([light.uv for light in cell_lights]),
+            np.concatenate([light.vertex for light in cell_lights]),
+        )
+        run.keep(LIGHT, artifact)
+        transaction.put_arrays(LIGHT.name, artifact.to_arrays())
+        counts = {**self.counts(artifact), "ptm_bytes": total, **_about(shared.baking)}
+        if options.light_density < asked:
+            counts["reduced_density"] = options.light_density
+        return complete(work, counts, _notes(cell_lights))
+
+    def counts(self, light: Light) -> Counts:
+        return {
+            "lightmaps": int((light.side > 0).sum()),
+            "texels": int((light.side.astype("int64") ** 2).sum()),
+        }
+
+    def summary(self, n: Counts) -> str:
+        if not n["lightmaps"]:
+            if not n.get("too_many_bytes"):
+                return "no light"
+            least = size(n["too_many_bytes"])
+            return (
+                f"no light: lightmaps would add {least} or more, too much beside the images "
+                "(--light bake adds them)"
+            )
+        reduced = n.get("reduced_density", 0.0)
+        parts = (
+            ("of the model", n.get("light") == "model"),
+            ("with lamps", n.get("lamps")),
+            ("with the sky", n.get("sky")),
+            (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced),
+        )
+        return (
+            f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
+            f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
+        )
+
+    def tells(self, n: Counts) -> bool:
+        return bool(n.get("too_many_bytes"))
+
+    def misfit(self, light: Light, source: Stage[Any], contents: Any) -> str:
+        foreign = source is CELLS and len(light.side) != contents.cell_count
+        return "the light belongs to other cells" if foreign else ""
+
+
+LIGHT = LightStage()

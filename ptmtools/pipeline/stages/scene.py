@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.artifacts import Artifacts
-from ptmtools.pipeline.stage import Job, SceneOrigin, Stage, changes_of
+from ptmtools.pipeline.artifacts import Artifacts, Run
+from ptmtools.pipeline.stage import Counts, SceneOrigin, Stage, changes_of
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
 from ptmtools.store.layout import IMAGE_LIST, IMAGES, LIGHTS, arrays_of, sha256
@@ -89,14 +89,6 @@ def images_of(artifacts: Artifacts) -> tuple[SourceImage, ...]:
     return artifacts.cached(IMAGES, lambda: tuple(map(image, image_rows(artifacts))))
 
 
-def _inputs(artifacts: Artifacts, _: IngestOptions) -> dict[str, str]:
-    """See `Stage.inputs`: the files of the last run, as others are not known before the model is
-    read."""
-    assert artifacts.model
-    before = artifacts.before(SCENE)
-    return _digests(artifacts.model, before.inputs if before else (), artifacts.db.digests)
-
-
 def _digests(model: Path, names: Iterable[str], digests: Digests) -> dict[str, str]:
     """Name → SHA-256 of the files of a model, "" for one that is absent."""
     result = {}
@@ -162,45 +154,169 @@ def scene_origin(artifacts: Artifacts) -> SceneOrigin:
     triangle = np.arange(len(artifacts.original(SCENE).triangles))
     objects = np.zeros(0, np.int32)
     for change in changes_of(SCENE):
-        if change.origin and artifacts.is_stored(change):
-            origin = change.origin.load()(artifacts)
+        if artifacts.is_stored(change):
+            origin = change.origin(artifacts)
             objects = np.union1d(objects, origin.objects).astype(np.int32)
             triangle = triangle[origin.triangle]
     return SceneOrigin(objects, triangle)
 
 
-class ReadingJob(Job):
+def _model_of(artifacts: Artifacts) -> Path:
+    assert artifacts.model
+    return artifacts.model
+
+
+def _bytes(model: Path, names: Iterable[str], images: Iterable[SourceImage]) -> dict[str, int]:
+    """The sizes of the model's files without its images, and of these."""
+    painted = {name for image in images for name in image.files} - {model.name}
+    files = {name: model.parent / name for name in {model.name, *names} | painted}
+    sizes = {name: f.stat().st_size for name, f in files.items() if f.is_file()}
+    image_bytes = sum(length for name, length in sizes.items() if name in painted)
+    return {"model_bytes": sum(sizes.values()) - image_bytes, "image_bytes": image_bytes}
+
+
+def _put_images(
+    run: Run,
+    options: IngestOptions,
+    transaction: Transaction,
+    images: Iterable[SourceImage],
+    fresh: Iterable[SourceImage],
+    before: Iterable[Mapping[str, Any]] = (),
+) -> None:
+    """Stages the list of images, and a copy of each fresh one, which must be decodable; the
+    others are in the list ``before``."""
+    from ptmtools.parallel import map_in_order
+    from ptmtools.texture.images import check_image
+    from ptmtools.texture.model import Limits
+
+    images, fresh = tuple(images), tuple(fresh)
+
+    def put(image: SourceImage) -> int:
+        data = image.load()
+        with naming(image.name):
+            check_image(data, Limits(options.limit << 20))
+        transaction.put(f"{IMAGES}/{image.sha256}", data, image.sha256)
+        return len(data)
+
+    sizes = {row["name"]: row["bytes"] for row in before}
+    lengths = map_in_order(put, fresh, run.workers.here)
+    sizes |= {image.name: length for image, length in zip(fresh, lengths, strict=True)}
+    rows = [
+        {
+            "name": i.name,
+            "sha256": i.sha256,
+            "files": list(i.files),
+            "plain": i.plain,
+            "bytes": sizes[i.name],
+        }
+        for i in images
+    ]
+    run.cache(IMAGES, images)
+    run.cache(IMAGE_LIST, rows)
+    text = json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n"
+    transaction.put(IMAGE_LIST, text.encode())
+
+
+class SceneStage(Stage["Scene"]):
     """Reads the model, or its repainted images alone."""
 
-    @staticmethod
-    def load(
-        artifacts: Artifacts, stage: Stage[Any], arrays: Mapping[str, NDArray[np.generic]]
-    ) -> Scene:
-        """See `Job.load`."""
+    name = "scene"
+    about = "Read a model."
+    recipe = 11
+    changed = "the list of images has their sizes"
+    options = IngestOptions
+    artifact = Lazy("ptmtools.scene.model:Scene")
+    joined = True
+
+    def inputs(self, artifacts: Artifacts, options: IngestOptions) -> dict[str, str]:
+        """The files of the last run, as others are not known before the model is
+        read."""
+        before = artifacts.before(self)
+        return _digests(_model_of(artifacts), before.inputs if before else (), artifacts.db.digests)
+
+    def make(
+        self, run: Run, options: IngestOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord:
+        """Raises the errors of `ingest` and `check_image`."""
+        repainted = self._repaint(run, options, transaction, work)
+        return repainted or self._read(run, options, transaction, work)
+
+    def _read(
+        self, run: Run, options: IngestOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord:
+        from ptmtools.scene import ingest
+        from ptmtools.scene.notes import line, warnings
+
+        model = _model_of(run)
+        scene = ingest(model, options, run.progress, workers=run.workers.here)
+        run.keep(self, scene)
+        transaction.put_arrays(self.name, scene.to_arrays())
+        if scene.lights:
+            transaction.put_arrays(LIGHTS, scene.lights.to_arrays())
+        run.cache(arrays_of(LIGHTS), scene.lights or None)
+        _put_images(run, options, transaction, scene.images, scene.images)
+        return replace(
+            work,
+            inputs=_digests(model, scene.files, run.db.digests),
+            counts={**self.counts(scene), **_bytes(model, scene.files, scene.images)},
+            notes=tuple(map(line, scene.notes)),
+            warnings=tuple(warnings(scene.notes)),
+        )
+
+    def _repaint(
+        self, run: Run, options: IngestOptions, transaction: Transaction, work: StageRecord
+    ) -> StageRecord | None:
+        """Reads the repainted images; None if more has changed."""
+        from ptmtools.scene.images import is_plain
+        from ptmtools.scene.model import SourceImage
+        from ptmtools.scene.source import FileRange, HeldBytes
+
+        repainted = _repainted(run, work)
+        if repainted is None:
+            return None
+        model, before, rows = _model_of(run), run.record(self), image_rows(run)
+        fresh: dict[int, SourceImage] = {}
+        for i, name in repainted.items():
+            try:
+                data = FileRange(model.parent / name)()
+            except OSError:
+                return None
+            limit = options.limit << 20
+            if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"], limit):
+                return None
+            held = HeldBytes(data)
+            fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
+        old = {f"{IMAGES}/{before.inputs[name]}" for name in repainted.values()} | {IMAGE_LIST}
+        kept = {name: digest for name, digest in before.outputs.items() if name not in old}
+        if not transaction.keep(kept):
+            return None
+        images = [fresh.get(i, image) for i, image in enumerate(images_of(run))]
+        _put_images(run, options, transaction, images, fresh.values(), rows)
+        counts = {**before.counts, **_bytes(model, work.inputs, images)}
+        return replace(work, counts=counts, notes=before.notes, warnings=before.warnings)
+
+    def load(self, artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) -> Scene:
         from ptmtools.scene.model import Scene
 
         return Scene.from_arrays(arrays, images_of(artifacts))
 
-    @staticmethod
-    def missing(artifacts: Artifacts, artifact: Scene) -> Iterator[tuple[str, str, str]]:
-        """The images without a copy in the database, and damaged lights, see `Job.missing`."""
+    def missing(self, artifacts: Artifacts, scene: Scene) -> Iterator[tuple[str, str, str]]:
+        """The images without a copy in the database, and damaged lights."""
         try:
             lights_of(artifacts)
         except DatabaseError as fault:
             yield arrays_of(LIGHTS), "", fault.message
-        outputs = artifacts.record(SCENE).outputs
-        for image in artifact.images:
+        outputs = artifacts.record(self).outputs
+        for image in scene.images:
             if outputs.get(f"{IMAGES}/{image.sha256}") != image.sha256:
                 yield IMAGE_LIST, image.name, "is not in the database"
 
-    @staticmethod
-    def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
-        """See `Job.foresee`: known if only plain images were repainted."""
+    def foresee(self, artifacts: Artifacts, work: StageRecord) -> bool:
+        """Known if only plain images were repainted."""
         repainted = _repainted(artifacts, work)
         if repainted is None:
             return False
-        assert artifacts.model
-        folder = artifacts.model.parent
+        folder = _model_of(artifacts).parent
         try:
             new = {
                 i: {"sha256": work.inputs[name], "bytes": (folder / name).stat().st_size}
@@ -212,150 +328,31 @@ class ReadingJob(Job):
         artifacts.cache(IMAGE_LIST, rows)
         return True
 
-    @property
-    def _model(self) -> Path:
-        assert self.run.model
-        return self.run.model
+    def counts(self, scene: Scene) -> Counts:
+        return {
+            "triangles": len(scene.triangles),
+            "objects": len(scene.objects),
+            "materials": len(scene.materials),
+            "images": len(scene.images),
+            "size": (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist(),
+            "origin": list(scene.space.origin),
+            "metres": scene.space.metres,
+            "up": scene.space.up,
+            "unit_guessed": scene.space.unit_guessed,
+            "up_guessed": scene.space.up_guessed,
+        }
 
-    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        """Raises the errors of `ingest` and `check_image`."""
-        return self._repaint(transaction, work) or self._read(transaction, work)
-
-    def _read(self, transaction: Transaction, work: StageRecord) -> StageRecord:
-        from ptmtools.scene import ingest
-        from ptmtools.scene.notes import line, warnings
-
-        run = self.run
-        scene = ingest(self._model, self.options, run.progress, workers=run.workers.here)
-        run.keep(SCENE, scene)
-        transaction.put_arrays(SCENE.name, scene.to_arrays())
-        if scene.lights:
-            transaction.put_arrays(LIGHTS, scene.lights.to_arrays())
-        run.cache(arrays_of(LIGHTS), scene.lights or None)
-        self._put_images(transaction, scene.images, scene.images)
-        return replace(
-            work,
-            inputs=_digests(self._model, scene.files, run.db.digests),
-            counts={**_counts(scene), **self._bytes(scene.files, scene.images)},
-            notes=tuple(map(line, scene.notes)),
-            warnings=tuple(warnings(scene.notes)),
+    def summary(self, n: Counts) -> str:
+        guessed = [
+            text for text, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]
+        ]
+        how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
+        width, height, depth = n["size"]
+        return (
+            f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
+            f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {str(n['up']).upper()} up"
+            f"{how}; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
         )
 
-    def _repaint(self, transaction: Transaction, work: StageRecord) -> StageRecord | None:
-        """Reads the repainted images; None if more has changed."""
-        from ptmtools.scene.images import is_plain
-        from ptmtools.scene.model import SourceImage
-        from ptmtools.scene.source import FileRange, HeldBytes
 
-        repainted = _repainted(self.run, work)
-        if repainted is None:
-            return None
-        before, rows = self.run.record(SCENE), image_rows(self.run)
-        fresh: dict[int, SourceImage] = {}
-        for i, name in repainted.items():
-            try:
-                data = FileRange(self._model.parent / name)()
-            except OSError:
-                return None
-            limit = self.options.limit << 20
-            if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"], limit):
-                return None
-            held = HeldBytes(data)
-            fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
-        old = {f"{IMAGES}/{before.inputs[name]}" for name in repainted.values()} | {IMAGE_LIST}
-        kept = {name: digest for name, digest in before.outputs.items() if name not in old}
-        if not transaction.keep(kept):
-            return None
-        images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
-        self._put_images(transaction, images, fresh.values(), rows)
-        counts = {**before.counts, **self._bytes(work.inputs, images)}
-        return replace(work, counts=counts, notes=before.notes, warnings=before.warnings)
-
-    def _bytes(self, names: Iterable[str], images: Iterable[SourceImage]) -> dict[str, int]:
-        """The sizes of the model's files without its images, and of these."""
-        painted = {name for image in images for name in image.files} - {self._model.name}
-        files = {name: self._model.parent / name for name in {self._model.name, *names} | painted}
-        sizes = {name: f.stat().st_size for name, f in files.items() if f.is_file()}
-        image_bytes = sum(length for name, length in sizes.items() if name in painted)
-        return {"model_bytes": sum(sizes.values()) - image_bytes, "image_bytes": image_bytes}
-
-    def _put_images(
-        self,
-        transaction: Transaction,
-        images: Iterable[SourceImage],
-        fresh: Iterable[SourceImage],
-        before: Iterable[Mapping[str, Any]] = (),
-    ) -> None:
-        """Stages the list of images, and a copy of each fresh one, which must be decodable; the
-        others are in the list ``before``."""
-        from ptmtools.parallel import map_in_order
-        from ptmtools.texture.images import check_image
-        from ptmtools.texture.model import Limits
-
-        images, fresh = tuple(images), tuple(fresh)
-
-        def put(image: SourceImage) -> int:
-            data = image.load()
-            with naming(image.name):
-                check_image(data, Limits(self.options.limit << 20))
-            transaction.put(f"{IMAGES}/{image.sha256}", data, image.sha256)
-            return len(data)
-
-        sizes = {row["name"]: row["bytes"] for row in before}
-        lengths = map_in_order(put, fresh, self.run.workers.here)
-        sizes |= {image.name: length for image, length in zip(fresh, lengths, strict=True)}
-        rows = [
-            {
-                "name": i.name,
-                "sha256": i.sha256,
-                "files": list(i.files),
-                "plain": i.plain,
-                "bytes": sizes[i.name],
-            }
-            for i in images
-        ]
-        self.run.cache(IMAGES, images)
-        self.run.cache(IMAGE_LIST, rows)
-        text = json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n"
-        transaction.put(IMAGE_LIST, text.encode())
-
-
-def _counts(scene: Scene) -> Mapping[str, Any]:
-    return {
-        "triangles": len(scene.triangles),
-        "objects": len(scene.objects),
-        "materials": len(scene.materials),
-        "images": len(scene.images),
-        "size": (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist(),
-        "origin": list(scene.space.origin),
-        "metres": scene.space.metres,
-        "up": scene.space.up,
-        "unit_guessed": scene.space.unit_guessed,
-        "up_guessed": scene.space.up_guessed,
-    }
-
-
-def _summary(n: Mapping[str, Any]) -> str:
-    guessed = [text for text, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]]
-    how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
-    width, height, depth = n["size"]
-    return (
-        f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
-        f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {str(n['up']).upper()} up"
-        f"{how}; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
-    )
-
-
-SCENE: Stage[Scene] = Stage(
-    name="scene",
-    about="Read a model.",
-    recipe=11,
-    changed="the list of images has their sizes",
-    options=IngestOptions,
-    inputs=_inputs,
-    artifact=Lazy("ptmtools.scene.model:Scene"),
-    counts=_counts,
-    summary=_summary,
-    job=ReadingJob,
-    joined=True,
-)
+SCENE = SceneStage()

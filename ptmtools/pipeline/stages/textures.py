@@ -15,7 +15,7 @@ import io
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -39,7 +39,7 @@ from ptmtools.pipeline.encoding import (
     stem_of,
     steps_file,
 )
-from ptmtools.pipeline.stage import Job, Stage
+from ptmtools.pipeline.stage import Counts, Stage, Turn
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests, image_rows, images_of
@@ -67,17 +67,6 @@ IMAGES_PER_MESSAGE = 4
 def texture_files(images: Iterable[str]) -> list[str]:
     """The `.ptm` of each image, named by its stem, relative to the served folder."""
     return [ptm_file(image.rpartition(".")[0]) for image in images]
-
-
-def _inputs(artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
-    """See `Stage.inputs`: the name of each `.ptm` → the digest of its image, and of the number of
-    its unresolved levels."""
-    images = image_digests(artifacts)
-    digests = [
-        sha256(f"{digest} - {fewer}".encode()) if fewer else digest
-        for digest, fewer in zip(images.values(), unresolved(artifacts, options), strict=True)
-    ]
-    return dict(zip(texture_files(images), digests, strict=True))
 
 
 def _coding(record: StageRecord) -> dict[str, Any]:
@@ -205,20 +194,8 @@ def _files_by_stem(record: StageRecord | None) -> dict[str, dict[str, str]]:
     return files
 
 
-class TexturesJob(Job):
+class TexturesTurn(Turn):
     """Encodes the images of the scene, in the background where that pays."""
-
-    @staticmethod
-    def tasks(artifacts: Artifacts, work: StageRecord) -> list[str]:
-        """The textures to encode, those with lost files included, see `Job.tasks`."""
-        before = artifacts.before(TEXTURES)
-        stale = set(stale_textures(before, work))
-        files = _files_by_stem(before)
-
-        def is_lost(name: str) -> bool:
-            return artifacts.db.first_damage(files.get(stem_of(name), {})) is not None
-
-        return [name for name in work.inputs if name in stale or is_lost(name)]
 
     def __init__(self, run: Run, stage: Stage[None], options: TextureOptions) -> None:
         super().__init__(run, stage, options)
@@ -236,7 +213,7 @@ class TexturesJob(Job):
         return len(self._left)
 
     def begin(self) -> None:
-        """See `Job.begin`."""
+        """See `Turn.begin`."""
         from ptmtools.parallel import BackgroundLoop
 
         self._prepare()
@@ -246,16 +223,16 @@ class TexturesJob(Job):
             self._background = BackgroundLoop(self.encode, executor, free)
 
     def raise_failure(self) -> None:
-        """See `Job.raise_failure`."""
+        """See `Turn.raise_failure`."""
         if self._background:
             self._background.check()
 
     def abandon(self) -> None:
-        """See `Job.abandon`."""
+        """See `Turn.abandon`."""
         if self._background:
             self._background.abandon()
 
-    def do(self) -> None:
+    def take(self) -> None:
         """Encodes the textures left, with all workers, and commits."""
         self._prepare()
         if self._background:
@@ -455,29 +432,65 @@ def header_of(source: PtmSource) -> PtmHeader:
     return read_header(first_bytes(source, HEAD_MAX))
 
 
-def _summary(n: Mapping[str, Any]) -> str:
-    raw, stored = n["raw_bytes"], n["ptm_bytes"]
-    share = f" ({stored / raw:.1%})" if raw else ""
-    more = ""
-    if previews := n.get("preview_bytes"):
-        more = f"; previews {size(previews)}"
-        if kept := n["kept_sources"]:
-            more += f", of which {count(kept, 'lossy image')} of the model"
-    if unresolved := n.get("unresolved"):
-        more += f"; {size(n['unresolved_bytes'])} of {count(unresolved, 'texture')} omitted"
-    return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}{more}"
+class TexturesStage(Stage[None]):
+    """Encodes the images of the scene."""
+
+    name = "textures"
+    about = "Encode the model's images as progressive textures."
+    recipe = 6
+    changed = (
+        "previews of the levels are written, lossy images are kept as they are, and the error "
+        "and the offset of each level are recorded"
+    )
+    options = TextureOptions
+    opens_inputs = True
+
+    def read_with(self, options: TextureOptions) -> tuple[Stage[Any], ...]:
+        return (SCENE, CELLS, PVS) if options.trim else (SCENE,)
+
+    def sources(self, options: TextureOptions) -> tuple[Stage[Any], ...]:
+        """Without ``--trim`` it reads the images only, which no stage changes."""
+        return super().sources(options) if options.trim else (SCENE,)
+
+    def inputs(self, artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
+        """The name of each `.ptm` → the digest of its image, and of the number of
+        its unresolved levels."""
+        images = image_digests(artifacts)
+        digests = [
+            sha256(f"{digest} - {fewer}".encode()) if fewer else digest
+            for digest, fewer in zip(images.values(), unresolved(artifacts, options), strict=True)
+        ]
+        return dict(zip(texture_files(images), digests, strict=True))
+
+    def changed_input(self, names: list[str]) -> str:
+        """Its inputs are images."""
+        return SCENE.name
+
+    def tasks(self, artifacts: Artifacts, work: StageRecord) -> list[str]:
+        """The textures to encode, those with lost files included."""
+        before = artifacts.before(self)
+        stale = set(stale_textures(before, work))
+        files = _files_by_stem(before)
+
+        def is_lost(name: str) -> bool:
+            return artifacts.db.first_damage(files.get(stem_of(name), {})) is not None
+
+        return [name for name in work.inputs if name in stale or is_lost(name)]
+
+    def turn(self, run: Run, options: TextureOptions) -> TexturesTurn:
+        return TexturesTurn(run, self, options)
+
+    def summary(self, n: Counts) -> str:
+        raw, stored = n["raw_bytes"], n["ptm_bytes"]
+        share = f" ({stored / raw:.1%})" if raw else ""
+        more = ""
+        if previews := n.get("preview_bytes"):
+            more = f"; previews {size(previews)}"
+            if kept := n["kept_sources"]:
+                more += f", of which {count(kept, 'lossy image')} of the model"
+        if unresolved := n.get("unresolved"):
+            more += f"; {size(n['unresolved_bytes'])} of {count(unresolved, 'texture')} omitted"
+        return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}{more}"
 
 
-TEXTURES: Stage[None] = Stage(
-    name="textures",
-    about="Encode the model's images as progressive textures.",
-    recipe=6,
-    changed="previews of the levels are written, lossy images are kept as they are, and the error "
-    "and the offset of each level are recorded",
-    options=TextureOptions,
-    reads=lambda options: (SCENE, CELLS, PVS) if options.trim else (SCENE,),
-    before_changes=lambda options: not options.trim,  # it reads the images only
-    inputs=_inputs,
-    summary=_summary,
-    job=TexturesJob,
-)
+TEXTURES = TexturesStage()
