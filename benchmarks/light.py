@@ -53,7 +53,7 @@ from ptmtools.output.served import on_link
 from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.encoding import TextureOptions, encoded_texels
+from ptmtools.pipeline.encoding import TextureOptions, encode_texels
 from ptmtools.pipeline.stages import CELLS, EMIT, LIGHT, SCENE, TEXTURES
 from ptmtools.pipeline.stages.light import lightmap_files
 from ptmtools.scene import Scene, ingest
@@ -182,7 +182,7 @@ def parts(model: Path) -> None:
 
 def ptm_bytes(texels: NDArray[np.uint8]) -> int:
     """The bytes of a lightmap as stored."""
-    return len(encoded_texels(TextureOptions(fallback=False), "light", texels[:, :, None])[0][1])
+    return len(encode_texels(TextureOptions(fallback=False), "light", texels[:, :, None])[0][1])
 
 
 def with_panels(scene: Scene, cells: Cells) -> tuple[Scene, Lights]:

@@ -1,11 +1,12 @@
 """Encodes one image as a task: a `.ptm`, its previews, the `Steps` of both, a fallback image.
 
-`encoded_image` takes and returns bytes. `encoded_on_disk` is for processes, of this machine or
-others, that see the disk of the database: only names and digests travel. (Sending the bytes of
-images and textures limits the building process to eight workers, docs/design/scaling.md.) A worker
-writes to a folder with a new name in every run, so one that an interrupted run has left behind
-writes nowhere. `encoded_at_url` is for machines without a shared disk: they read and write objects
-at the URL of the database.
+`encode_texture` reads an image from a place, and leaves the files of its texture there. In
+`Messages` the bytes travel with the task and its result. A `SharedDisk` is for processes, of this
+machine or others, that see the disk of the database: only names and digests travel. (Sending the
+bytes of images and textures limits the building process to eight workers, docs/design/scaling.md.)
+A worker writes to a folder with a new name in every run, so one that an interrupted run has left
+behind writes nowhere. A `SharedUrl` is for machines without a shared disk: they read and write
+objects at the URL of the database.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from ptmtools.executor import Executor
     from ptmtools.pipeline.artifacts import Run
+    from ptmtools.scene.model import SourceImage
     from ptmtools.store.objects import Objects
     from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
@@ -42,6 +44,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+#: Objects that are sent, and textures that are fetched, at a time.
+OBJECTS_AHEAD = 8
 #: Folders of the served files: `.ptm`s with fallback images and lossy sources; other previews.
 FOLDER, PREVIEWS = "textures", "previews"
 
@@ -115,31 +119,16 @@ class TextureOptions(PreviewOptions, EncodeOptions):
             require((0 < value < limit, f"trim_{name} is {value:g}", remedy))
 
 
-@dataclass(frozen=True)
-class ImageFile:
-    """An image to encode.
-
-    Attributes
-    ----------
-    name: as in the list of the scene's images, "wood.png". data: the bytes of its file.
-    unresolved: number of its finest levels to leave out.
-    """
-
-    name: str
-    data: bytes
-    unresolved: int = 0
-
-
-def encoded_texels(
+def encode_texels(
     options: TextureOptions, stem: str, texels: NDArray[Any]
 ) -> list[tuple[str, bytes]]:
-    """The files of (h, w, c) texels that are no image of the model, as `encoded_image`."""
+    """The files of (h, w, c) texels that are no image of the model, as `encode_image`."""
     from ptmtools.texture.images import png_bytes
 
-    return encoded_image(options, ImageFile(f"{stem}.png", png_bytes(texels)))
+    return encode_image(options, f"{stem}.png", png_bytes(texels))
 
 
-def baked(
+def bake_textures(
     run: Run,
     transaction: Transaction,
     bake: Callable[[S, T], tuple[R, list[tuple[str, bytes]]]],
@@ -148,7 +137,7 @@ def baked(
     unit: str,
 ) -> tuple[list[R], int]:
     """Bakes textures, a task each: ``bake`` returns a result, and the files of a texture as
-    `encoded_image`, or none. Puts these into the transaction; returns the results, and the bytes
+    `encode_image`, or none. Puts these into the transaction; returns the results, and the bytes
     of all `.ptm`s."""
     results: list[R] = []
     total = 0
@@ -162,9 +151,12 @@ def baked(
     return results, total
 
 
-def encoded_image(options: TextureOptions, image: ImageFile) -> list[tuple[str, bytes]]:
+def encode_image(
+    options: TextureOptions, name: str, data: bytes, unresolved: int = 0
+) -> list[tuple[str, bytes]]:
     """The files of a texture, named relative to the database: first its `.ptm` and its `Steps` as
-    JSON, then its previews and, if the options ask for one, its fallback image.
+    JSON, then its previews and, if the options ask for one, its fallback image. ``unresolved`` of
+    the finest levels are left out.
 
     Raises as `encode_steps` and `load_image`.
     """
@@ -173,24 +165,24 @@ def encoded_image(options: TextureOptions, image: ImageFile) -> list[tuple[str, 
     from ptmtools.texture.model import Description, Limits
     from ptmtools.texture.steps import encode_steps
 
-    with naming(image.name):
-        picture = load_image(image.data, Limits(options.limit << 20))
+    with naming(name):
+        picture = load_image(data, Limits(options.limit << 20))
         check_depth(picture)
         picture = replace(picture, description=Description())
         height, width = picture.texels.shape[:2]
-        levels = without_finest(options, image.unresolved, width, height)
-        encoded = encode_steps(picture, image.data, levels, options)
-    stem = image.name.rpartition(".")[0]
+        levels = without_finest(options, unresolved, width, height)
+        encoded = encode_steps(picture, data, levels, options)
+    stem = name.rpartition(".")[0]
     files = [
         (f"{SERVED}/{ptm_file(stem)}", encoded.ptm),
         (steps_file(stem), steps_text(encoded.steps)),
     ]
     files += [
-        (f"{SERVED}/{preview_file(stem, preview)}", data)
-        for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True)
+        (f"{SERVED}/{preview_file(stem, preview)}", preview_bytes)
+        for preview, preview_bytes in zip(encoded.steps.previews, encoded.previews, strict=True)
     ]
     if options.fallback and fallback_preview(encoded.steps, options.fallback_size) is None:
-        png = _png(options, image.data, picture, encoded.ptm)
+        png = _png(options, data, picture, encoded.ptm)
         files.append((f"{SERVED}/{FOLDER}/{stem}.png", png))
     return files
 
@@ -211,83 +203,127 @@ def _png(options: TextureOptions, source: bytes, picture: Picture, data: bytes) 
 
 
 @dataclass(frozen=True)
-class SharedDisk:
-    """The options of all tasks, and the absolute paths of the database and of the folder for
-    results."""
-
-    options: TextureOptions
-    database: str
-    out: str
-
-
-@dataclass(frozen=True)
-class ImageTask:
-    """An image of the database.
+class TextureTask:
+    """An image of the database to encode.
 
     Attributes
     ----------
-    name, unresolved: see `ImageFile`. sha256: of its bytes. stem: of its result files on a disk.
-    file: relative to the model's folder, for an image that is not in the database yet.
+    name: as in the list of the scene's images, "wood.png". sha256: of its bytes.
+    unresolved: number of its finest levels to leave out.
+    data: its bytes, if they travel.
+    stem: of its result files on a disk.
+    file: relative to the model's folder, for an image that is no object of the database yet.
     """
 
     name: str
     sha256: str
-    stem: str = ""
     unresolved: int = 0
+    data: bytes = b""
+    stem: str = ""
     file: str = ""
 
 
-@contextmanager
-def shared_disk(
-    transaction: Transaction, database: Path, options: TextureOptions, executor: Executor
-) -> Iterator[SharedDisk | None]:
-    """The disk, if all workers are other processes that see it; None if bytes must be sent.
+@dataclass(frozen=True)
+class OutputFile:
+    """A file of a texture, named relative to the database ("" for its image): SHA-256, number of
+    bytes; and these, if they travel, its path if it is on a disk, or neither if it is an object."""
 
-    Raises WorkerError PTM-W005 if only some workers see it.
-    """
-    import secrets
-    import shutil
-
-    if not executor.remote:
-        yield None
-        return
-    out = transaction.subfolder(f"out-{secrets.token_hex(8)}")
-    disk = SharedDisk(options, str(database.resolve()), str(out.resolve()))
-    try:
-        seen = list(executor.each(_sees, disk, range(4 * executor.workers), releases_lock=True))
-        if any(seen) and not all(seen):
-            raise _half_seen(disk)
-        yield disk if all(seen) else None
-    finally:
-        shutil.rmtree(out, ignore_errors=True)
-
-
-def encoded_on_disk(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str, str]]:
-    """Writes the results of `encoded_image` to the shared disk: (name, file, SHA-256) of each.
-
-    Raises as that; WorkerError PTM-W005 where the disk cannot be seen.
-    """
-    from ptmtools.files import write_bytes
-
-    results = encoded_image(
-        disk.options, ImageFile(image.name, _image(disk, image), image.unresolved)
-    )
-    files = []
-    for number, (name, data) in enumerate(results):
-        file = Path(disk.out, f"{image.stem}-{number}")
-        write_bytes(file, data, force=True)
-        files.append((name, str(file), sha256(data)))
-    return files
+    name: str
+    sha256: str
+    size: int
+    data: bytes | None = None
+    path: str = ""
 
 
 @dataclass(frozen=True)
-class SharedUrl:
-    """The options of all tasks, and the URLs of the database and of the model's folder, if it has
-    one."""
+class EncodedTexture:
+    """The files of a texture, the head of its `.ptm`, `HEAD_MAX` bytes or all, and the file of its
+    `Steps`, which later stages need."""
+
+    files: list[OutputFile]
+    head: bytes
+    steps: bytes
+
+
+def encode_texture(place: Messages, task: TextureTask) -> EncodedTexture:
+    """Raises as `encode_image` and the place."""
+    from ptmtools.texture.container import HEAD_MAX
+
+    image = place.read(task)
+    outputs = encode_image(place.options, task.name, image, task.unresolved)
+    (_, ptm), (_, steps) = outputs[:2]
+    if task.file:
+        outputs.append(("", image))
+    files = [place.write(task, number, *output) for number, output in enumerate(outputs)]
+    return EncodedTexture(files, ptm[:HEAD_MAX], steps)
+
+
+@dataclass(frozen=True)
+class Messages:
+    """The place of images and textures that travel with the tasks and their results.
+
+    Attributes
+    ----------
+    options: of all tasks.
+    """
 
     options: TextureOptions
+    #: Largest number of images in one message to a worker; a message costs a few ms.
+    most_images: ClassVar[int] = 1
+    #: Images that are sent at a time.
+    ahead: ClassVar[int] = 1
+
+    def send(self, run: Run, image: SourceImage, number: int, unresolved: int) -> TextureTask:
+        """The task of an image, of which workers find the bytes."""
+        return TextureTask(image.name, image.sha256, unresolved, image.load())
+
+    def read(self, task: TextureTask) -> bytes:
+        """The bytes of an image, in the worker."""
+        return task.data
+
+    def write(self, task: TextureTask, number: int, name: str, data: bytes) -> OutputFile:
+        """A file of its texture, by the worker."""
+        return OutputFile(name, sha256(data), len(data), data)
+
+
+@dataclass(frozen=True)
+class SharedDisk(Messages):
+    """The disk of a database: the absolute paths of it and of the folder for results."""
+
+    database: str
+    out: str
+    most_images: ClassVar[int] = 4
+
+    def send(self, run: Run, image: SourceImage, number: int, unresolved: int) -> TextureTask:
+        run.db.bring(f"{IMAGES}/{image.sha256}", image.sha256)
+        return TextureTask(image.name, image.sha256, unresolved, stem=str(number))
+
+    def read(self, task: TextureTask) -> bytes:
+        """From `IMAGES` or, until the scene is committed, the staging folder. Raises WorkerError
+        PTM-W005 where the disk cannot be seen."""
+        for folder in ("", f"{STAGING}/scene", ""):
+            with suppress(OSError):
+                data = Path(self.database, folder, IMAGES, task.sha256).read_bytes()
+                if sha256(data) == task.sha256:
+                    return data
+        raise _half_seen(self)
+
+    def write(self, task: TextureTask, number: int, name: str, data: bytes) -> OutputFile:
+        from ptmtools.files import write_bytes
+
+        file = Path(self.out, f"{task.stem}-{number}")
+        write_bytes(file, data, force=True)
+        return OutputFile(name, sha256(data), len(data), path=str(file))
+
+
+@dataclass(frozen=True)
+class SharedUrl(Messages):
+    """The URLs of a database and of the model's folder, if it has one."""
+
     url: str
     model: str = ""
+    most_images: ClassVar[int] = 4
+    ahead: ClassVar[int] = OBJECTS_AHEAD
 
     @cached_property
     def database(self) -> RemoteDatabase:
@@ -306,57 +342,54 @@ class SharedUrl:
     def __getstate__(self) -> dict[str, object]:
         return {"options": self.options, "url": self.url, "model": self.model}
 
+    def send(self, run: Run, image: SourceImage, number: int, unresolved: int) -> TextureTask:
+        assert run.remote
+        file = ""
+        if self.model and image.files and run.remote.size(image.sha256) is None:
+            file = image.files[0]
+        if not file:
+            run.remote.provide(image.sha256, image.load)
+        return TextureTask(image.name, image.sha256, unresolved, file=file)
 
-@dataclass(frozen=True)
-class EncodedAtUrl:
-    """The result of `encoded_at_url`.
+    def read(self, task: TextureTask) -> bytes:
+        """Its object or, if there is none, the model's file. Raises as `RemoteDatabase`; InputError
+        PTM-I122 if that file has changed."""
+        if not task.file:
+            return self.database.read(task.sha256)
+        data = self.files.read(task.file)
+        if sha256(data) != task.sha256:
+            raise self.files.failure("has changed since the model was read", task.file)
+        return data
 
-    Attributes
-    ----------
-    files: (name, SHA-256, bytes) of each object written; the image's name is "".
-    head: of the `.ptm`, `HEAD_MAX` bytes or all.
-    steps: the file of its `Steps`.
+    def write(self, task: TextureTask, number: int, name: str, data: bytes) -> OutputFile:
+        digest = sha256(data)
+        self.database.write(digest, data)
+        return OutputFile(name, digest, len(data))
+
+
+@contextmanager
+def shared_disk(
+    transaction: Transaction, database: Path, options: TextureOptions, executor: Executor
+) -> Iterator[Messages]:
+    """The disk, if all workers are other processes that see it, otherwise messages.
+
+    Raises WorkerError PTM-W005 if only some workers see it.
     """
+    import secrets
+    import shutil
 
-    files: list[tuple[str, str, int]]
-    head: bytes
-    steps: bytes
-
-
-def encoded_at_url(place: SharedUrl, image: ImageTask) -> EncodedAtUrl:
-    """Reads the object of an image, and writes the results of `encoded_image` as objects. An image
-    that is no object yet is read from the model's folder and written, too.
-
-    Raises as that, and as `RemoteDatabase`; InputError PTM-I122 if the model's file has changed.
-    """
-    from ptmtools.texture.container import HEAD_MAX
-
-    outputs = []
-    if image.file:
-        data = place.files.read(image.file)
-        if sha256(data) != image.sha256:
-            raise place.files.failure("has changed since the model was read", image.file)
-        outputs.append(("", data))
-    else:
-        data = place.database.read(image.sha256)
-    results = encoded_image(place.options, ImageFile(image.name, data, image.unresolved))
-    files = []
-    for name, output in (*outputs, *results):
-        digest = sha256(output)
-        place.database.write(digest, output)
-        files.append((name, digest, len(output)))
-    ptm, steps = (output for _, output in results[:2])
-    return EncodedAtUrl(files, ptm[:HEAD_MAX], steps)
-
-
-def _image(disk: SharedDisk, image: ImageTask) -> bytes:
-    """The bytes of an image from `IMAGES` or, until the scene is committed, the staging folder."""
-    for folder in ("", f"{STAGING}/scene", ""):
-        with suppress(OSError):
-            data = Path(disk.database, folder, IMAGES, image.sha256).read_bytes()
-            if sha256(data) == image.sha256:
-                return data
-    raise _half_seen(disk)
+    if not executor.remote:
+        yield Messages(options)
+        return
+    out = transaction.subfolder(f"out-{secrets.token_hex(8)}")
+    disk = SharedDisk(options, str(database.resolve()), str(out.resolve()))
+    try:
+        seen = list(executor.each(_sees, disk, range(4 * executor.workers), releases_lock=True))
+        if any(seen) and not all(seen):
+            raise _half_seen(disk)
+        yield disk if all(seen) else Messages(options)
+    finally:
+        shutil.rmtree(out, ignore_errors=True)
 
 
 def _sees(disk: SharedDisk, _: int) -> bool:

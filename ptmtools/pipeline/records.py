@@ -117,11 +117,7 @@ def _restored(hint: Any, value: Any) -> Any:
 
 
 def reasons(
-    stage: str,
-    before: StageRecord | None,
-    work: StageRecord,
-    db: DatabaseFolder,
-    changed: str = "",
+    stage: str, before: StageRecord | None, work: StageRecord, db: DatabaseFolder, changed: str = ""
 ) -> tuple[str, ...]:
     """Why a stage with the record ``before`` has to do ``work``; empty if it is current.
     ``changed`` describes the change of its recipe."""

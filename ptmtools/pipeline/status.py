@@ -130,14 +130,7 @@ def _status(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
         state, why = "damaged", f"{lost} is missing or damaged"
     elif earlier := artifacts.outdated(stage):
         state, why = "stale", f"made from an earlier {earlier}"
-    return StageStatus(
-        stage.name,
-        state,
-        why,
-        record.counts,
-        len(sizes),
-        sum(sizes),
-    )
+    return StageStatus(stage.name, state, why, record.counts, len(sizes), sum(sizes))
 
 
 Plan = Literal["current", "run", "maybe"]

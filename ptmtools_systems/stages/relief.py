@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.artifacts import Artifacts, Run
-from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
+from ptmtools.pipeline.encoding import TextureOptions, bake_textures, encode_texels, ptm_file
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.scene import SCENE, scene_origin
 from ptmtools.pipeline.stages.textures import TEXTURES
@@ -47,10 +47,10 @@ class Mapped:
 
 
 def mapped(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
-    """The normal map of an object, and its files as `encoded_image` returns them."""
+    """The normal map of an object, and its files as `encode_image` returns them."""
     number, stem = task
     relief = shared.replacing.normal_map(number)
-    return relief, encoded_texels(shared.options, stem, relief.texels)
+    return relief, encode_texels(shared.options, stem, relief.texels)
 
 
 def _notes(name: str, relief: NormalMap) -> Iterator[str]:
@@ -109,7 +109,7 @@ class ReliefStage(Stage["ObjectMaps"]):
         names = [shown.objects[number] for number in objects.tolist()]
         tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
         shared = Mapped(replacing, run.recorded(TEXTURES))
-        maps, total = baked(run, transaction, mapped, shared, tasks, "normal maps")
+        maps, total = bake_textures(run, transaction, mapped, shared, tasks, "normal maps")
         notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
         reliefs = object_maps(shown, objects, maps)
         run.keep(self, reliefs)

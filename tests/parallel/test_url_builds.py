@@ -67,7 +67,7 @@ def test_workers_that_share_no_folder(
         return seen(each(self, function, shared, seen(tasks), **settings))
 
     monkeypatch.setattr(Cluster, "each", recorded)
-    monkeypatch.setattr("ptmtools.pipeline.stages.textures.IMAGES_PER_MESSAGE", 1)
+    monkeypatch.setattr("ptmtools.pipeline.encoding.SharedUrl.most_images", 1)
     # One loop over all textures: the worker is killed during it, not before the next one begins.
     monkeypatch.setattr("ptmtools.parallel.Workers.background", lambda *_: None)
     killed: list[int] = []
@@ -113,8 +113,7 @@ def test_workers_that_share_no_folder(
     others = {r.path.removeprefix(begin) for r in requests if r not in by_workers}
     assert not others & (images | textures)
     # Names and digests alone passed through the scheduler.
-    assert {name for name, _ in asked if name.startswith("encoded")} == {"encoded_at_url"}
-    assert max(size for name, size in asked if name.startswith("encoded")) < 2000
+    assert max(size for name, size in asked if name == "encode_texture") < 2000
     assert sum(len(data) for name, data in expected.items() if name.endswith(".ptm")) > 50_000
 
     machine()

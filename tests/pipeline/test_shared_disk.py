@@ -13,10 +13,12 @@ from ptmtools.errors import OutputError, WorkerError
 from ptmtools.executor import Executor
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.encoding import (
-    ImageTask,
+    Messages,
+    SharedDisk,
     TextureOptions,
+    TextureTask,
     _sees,
-    encoded_on_disk,
+    encode_texture,
     shared_disk,
 )
 from ptmtools.store.layout import sha256
@@ -34,7 +36,7 @@ class Remote(Executor):
         self.asked: list[str] = []
 
     def each(self, function: Any, shared: Any, tasks: Any, **settings: Any) -> Iterator[Any]:
-        self.asked.append(function.__name__)
+        self.asked.append(type(shared).__name__)
         return super().each(function, shared, tasks, **settings)
 
 
@@ -66,9 +68,9 @@ def test_names_or_bytes_make_the_same_database(tmp_path, monkeypatch) -> None:
     expected = built(tmp_path / "near", monkeypatch, near)
     assert built(tmp_path / "far", monkeypatch, far) == expected
     assert built(tmp_path / "blind", monkeypatch, blind) == expected
-    assert "encoded_on_disk" in far.asked
-    assert "encoded_image" not in far.asked
-    assert "encoded_image" in blind.asked
+    assert "SharedDisk" in far.asked
+    assert "Messages" not in far.asked
+    assert "Messages" in blind.asked
 
 
 def test_a_disk_that_some_do_not_see_is_an_error(tmp_path, monkeypatch) -> None:
@@ -84,21 +86,21 @@ def transaction(tmp_path):
 
 def test_an_image_is_found_before_and_after_its_commit(tmp_path, transaction) -> None:
     image = (TWO_ROOMS / "floor.png").read_bytes()
-    task = ImageTask("a.png", sha256(image), "0")
+    task = TextureTask("a.png", sha256(image), stem="0")
     database = tmp_path / "db"
     with shared_disk(transaction, database, TextureOptions(), Remote()) as disk:
-        assert disk is not None
+        assert isinstance(disk, SharedDisk)
         with pytest.raises(WorkerError, match="PTM-W005"):
-            encoded_on_disk(disk, task)
+            encode_texture(disk, task)
         made = []
         for folder in (".ptm-new/scene/stages/images", "stages/images"):
             (database / folder).mkdir(parents=True)
             (database / folder / task.sha256).write_bytes(image)
-            made.append([digest for _, _, digest in encoded_on_disk(disk, task)])
+            made.append([file.sha256 for file in encode_texture(disk, task).files])
             (database / folder / task.sha256).write_bytes(image[:-1])
         assert made[0] == made[1]
         with pytest.raises(WorkerError, match="PTM-W005"):  # damaged, both of them
-            encoded_on_disk(disk, task)
+            encode_texture(disk, task)
 
 
 def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
@@ -107,13 +109,13 @@ def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
     folder.mkdir(parents=True)
     (folder / sha256(image)).write_bytes(image)
     with shared_disk(transaction, tmp_path / "db", TextureOptions(), Remote()) as disk:
-        assert disk is not None
+        assert isinstance(disk, SharedDisk)
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(OutputError):
-        encoded_on_disk(disk, ImageTask("a.png", sha256(image), "0"))
+        encode_texture(disk, TextureTask("a.png", sha256(image), stem="0"))
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_who_shares_memory_needs_no_shared_disk(tmp_path, transaction) -> None:
     with shared_disk(transaction, tmp_path, TextureOptions(), Executor()) as disk:
-        assert disk is None
+        assert type(disk) is Messages

@@ -12,7 +12,7 @@ from PIL import Image
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.errors import InputError
 from ptmtools.pipeline.build import build_scene, run_stage
-from ptmtools.pipeline.encoding import ImageFile, TextureOptions, encoded_image
+from ptmtools.pipeline.encoding import TextureOptions, encode_image
 from ptmtools.pipeline.stages import CELLS, TEXTURES
 from ptmtools.pipeline.status import plan_build
 from ptmtools.pipeline.validation import validate
@@ -119,11 +119,9 @@ def test_with_other_reasons_to_leave_levels_out(room: Path) -> None:
         (TextureOptions(min_level=9), 512),
         (TextureOptions(min_side=512), 512),
     ):
-        header = read_header(encoded_image(options, ImageFile("ceiling.png", source, 2))[0][1])
+        header = read_header(encode_image(options, "ceiling.png", source, 2)[0][1])
         assert header.levels[-1].width == finest, options
-    header = read_header(
-        encoded_image(TextureOptions(), ImageFile("ceiling.png", source, 64))[0][1]
-    )
+    header = read_header(encode_image(TextureOptions(), "ceiling.png", source, 64)[0][1])
     assert [level.width for level in header.levels] == [1]
 
 

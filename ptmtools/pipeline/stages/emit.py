@@ -10,6 +10,7 @@ from ptmtools import plugins
 from ptmtools.output.options import EmitOptions
 from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import (
+    OBJECTS_AHEAD,
     fallback_level,
     fallback_preview,
     preview_file,
@@ -21,12 +22,7 @@ from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.light import LIGHT, lightmap_files
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests
-from ptmtools.pipeline.stages.textures import (
-    OBJECTS_AHEAD,
-    TEXTURES,
-    stored_texture,
-    texture_files,
-)
+from ptmtools.pipeline.stages.textures import TEXTURES, stored_texture, texture_files
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 

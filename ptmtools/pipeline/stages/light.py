@@ -17,7 +17,7 @@ from ptmtools.lazy import Lazy, component
 from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
 from ptmtools.pipeline.artifacts import Artifacts, Run
-from ptmtools.pipeline.encoding import TextureOptions, baked, encoded_texels, ptm_file
+from ptmtools.pipeline.encoding import TextureOptions, bake_textures, encode_texels, ptm_file
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of, scene_origin
@@ -58,14 +58,14 @@ class LitCells:
 def lit(
     shared: LitCells, task: tuple[int, CellSurfaces]
 ) -> tuple[CellLight, list[tuple[str, bytes]]]:
-    """The light of a cell, and the files of its lightmap as `encoded_image` returns them; none
+    """The light of a cell, and the files of its lightmap as `encode_image` returns them; none
     without one."""
     cell, piece = task
     light = shared.baking.light(piece)
     if light.texels is None:
         return light, []
     texels = light.texels[:, :, None]
-    return light, encoded_texels(shared.options, lightmap_stem(cell), texels)
+    return light, encode_texels(shared.options, lightmap_stem(cell), texels)
 
 
 def lightmap_stem(cell: int) -> str:
@@ -98,17 +98,13 @@ def _baking(
     return LightBaking(around, options, light_mix(around, pieces, lamps, options, ABOVE, WHITE))
 
 
-def _check_component() -> None:
-    """Raises MissingComponentError."""
-    component("xatlas", "PTM-M100", "lightmaps need xatlas", "light")
-
-
-def _has_component() -> bool:
+def _absence() -> MissingComponentError | None:
+    """The error of lightmaps where xatlas is not installed."""
     try:
-        _check_component()
-    except MissingComponentError:
-        return False
-    return True
+        component("xatlas", "PTM-M100", "lightmaps need xatlas", "light")
+    except MissingComponentError as fault:
+        return fault
+    return None
 
 
 def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
@@ -198,14 +194,14 @@ class LightStage(Stage["Light"]):
 
             lights[_IMAGES] = sha256(str(round_bytes(image_bytes(artifacts))).encode())
         before = artifacts.before(self)
-        if before and _ABSENT in before.inputs and options.light == "auto" and not _has_component():
+        if before and _ABSENT in before.inputs and options.light == "auto" and _absence():
             lights[_ABSENT] = ""
         return lights | artifacts.files_of(self.sources(options)) | artifacts.choices(self)
 
     def check_options(self, options: LightOptions) -> None:
         """Raises MissingComponentError: PTM-M100 xatlas is not installed."""
-        if options.light in ("bake", "model"):
-            _check_component()
+        if options.light in ("bake", "model") and (fault := _absence()):
+            raise fault
 
     def check_model(self, run: Run, options: LightOptions) -> None:
         """Raises InputError PTM-I701: the model has no lightmaps, which the options ask for."""
@@ -247,18 +243,15 @@ class LightStage(Stage["Light"]):
                 least = round(expected_bytes(pieces, LEAST * asked))
                 return complete(work, {**_NO_LIGHT, "too_many_bytes": least}, ())
             options = replace(options, light_density=density)
-        if options.light == "auto":
-            try:
-                _check_component()
-            except MissingComponentError as fault:
-                left_out = f"lightmaps are left out: {fault.message}"
-                remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
-                work = replace(work, inputs={**work.inputs, _ABSENT: ""})
-                return complete(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
+        if options.light == "auto" and (fault := _absence()):
+            left_out = f"lightmaps are left out: {fault.message}"
+            remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
+            work = replace(work, inputs={**work.inputs, _ABSENT: ""})
+            return complete(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
         baking = _baking(run, options, own, lights, pieces)
         shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
-        cell_lights, total = baked(run, transaction, lit, shared, tasks, "light")
+        cell_lights, total = bake_textures(run, transaction, lit, shared, tasks, "light")
         artifact = Light(
             np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
             np.concatenate([light.mapped for light in cell_lights]),

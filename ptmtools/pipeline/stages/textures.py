@@ -15,8 +15,8 @@ import io
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -25,14 +25,13 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.errors import naming
 from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import (
-    EncodedAtUrl,
-    ImageFile,
-    ImageTask,
+    OBJECTS_AHEAD,
+    EncodedTexture,
+    Messages,
     SharedUrl,
     TextureOptions,
-    encoded_at_url,
-    encoded_image,
-    encoded_on_disk,
+    TextureTask,
+    encode_texture,
     ptm_file,
     read_steps,
     shared_disk,
@@ -52,16 +51,10 @@ if TYPE_CHECKING:
     from ptmtools.executor import Executor
     from ptmtools.parallel import BackgroundLoop
     from ptmtools.store.manifest import StageRecord
-    from ptmtools.store.remote import RemoteDatabase
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.model import PtmHeader
     from ptmtools.texture.previews import Steps
     from ptmtools.texture.sources import PtmSource
-
-#: Objects that are sent, and textures that are fetched, at a time.
-OBJECTS_AHEAD = 8
-#: Largest number of images in one message to a worker; a message costs a few ms.
-IMAGES_PER_MESSAGE = 4
 
 
 def texture_files(images: Iterable[str]) -> list[str]:
@@ -120,7 +113,7 @@ def _sizes(artifacts: Artifacts, options: TextureOptions) -> list[tuple[int, int
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredTexture:
     """A texture as stored.
 
     Attributes
@@ -156,7 +149,7 @@ class Stored:
 
 
 def _trimmed(
-    textures: Iterable[Stored], options: TextureOptions
+    textures: Iterable[StoredTexture], options: TextureOptions
 ) -> tuple[dict[str, int], list[str]]:
     """The counts of ``--trim``: the textures with levels left out, and the decoded bytes by which
     their finest levels are smaller. And a note on each, with the bytes saved as estimated. Nothing
@@ -213,7 +206,6 @@ class TexturesTurn(Turn):
         return len(self._left)
 
     def begin(self) -> None:
-        """See `Turn.begin`."""
         from ptmtools.parallel import BackgroundLoop
 
         self._prepare()
@@ -223,12 +215,10 @@ class TexturesTurn(Turn):
             self._background = BackgroundLoop(self.encode, executor, free)
 
     def raise_failure(self) -> None:
-        """See `Turn.raise_failure`."""
         if self._background:
             self._background.check()
 
     def abandon(self) -> None:
-        """See `Turn.abandon`."""
         if self._background:
             self._background.abandon()
 
@@ -280,90 +270,56 @@ class TexturesTurn(Turn):
 
         Raises as `encode`.
         """
-        assert self._transaction
-        start, transaction = time.perf_counter(), self._transaction
-        total, images, fewer = len(self._names), images_of(self.run), self._fewer
-        wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
-        chunk = max(1, min(IMAGES_PER_MESSAGE, len(self._left) // (8 * executor.workers)))
-        remote = self.run.remote if executor.machines else None
-        with ExitStack() as stack:
-            results: Iterator[Sequence[tuple[str, bytes] | tuple[str, str, str]] | EncodedAtUrl]
-            disk = None
-            if remote is None:
-                path = self.run.db.path
-                disk = stack.enter_context(shared_disk(transaction, path, self.options, executor))
-            if remote is not None:
-                results = self._encoded_at_url(remote, executor, wanted, chunk)
-            elif disk is None:
-                sources = (ImageFile(images[i].name, images[i].load(), fewer[i]) for i in wanted)
-                results = executor.each(encoded_image, self.options, sources, releases_lock=True)
-            else:
-                tasks = map(self._on_disk, wanted)
-                results = executor.each(
-                    encoded_on_disk, disk, tasks, releases_lock=True, chunk=chunk
-                )
-            for result in results:
-                names = self._put(transaction, result)
-                self.run.progress(total - len(self._left), total, "textures")
-                transaction.finish(self._task(self._left.popleft()), names)
-        self.run.progress(total - len(self._left), total, "textures")
-        self._seconds += time.perf_counter() - start
-
-    def _on_disk(self, i: int) -> ImageTask:
-        """The task of an image, which is on the disk of the database then."""
-        image = images_of(self.run)[i]
-        self.run.db.bring(f"{IMAGES}/{image.sha256}", image.sha256)
-        return ImageTask(image.name, image.sha256, str(i), self._fewer[i])
-
-    def _put(
-        self,
-        transaction: Transaction,
-        result: Sequence[tuple[str, bytes] | tuple[str, str, str]] | EncodedAtUrl,
-    ) -> list[str]:
-        """Stages the files of a texture; their names."""
-        if isinstance(result, EncodedAtUrl):
-            return self._leave(transaction, result)
-        for output in result:
-            if len(output) == 2:
-                transaction.put(*output)
-            else:
-                transaction.take(output[0], Path(output[1]), output[2])
-        return [output[0] for output in result]
-
-    def _leave(self, transaction: Transaction, result: EncodedAtUrl) -> list[str]:
-        """See `_put`. Later stages need the head and the steps."""
-        from ptmtools.texture.container import read_header
-
-        run, names = self.run, []
-        assert run.remote
-        for name, digest, length in result.files:
-            run.remote.note(digest, length)
-            if name:
-                transaction.leave(name, digest)
-                names.append(name)
-        run.cache(names[0], read_header(result.head))
-        run.cache(names[1], read_steps(result.steps))
-        return names
-
-    def _encoded_at_url(
-        self, remote: RemoteDatabase, executor: Executor, wanted: Iterable[int], chunk: int
-    ) -> Iterator[EncodedAtUrl]:
-        """The textures that workers have encoded from and to objects at the URL."""
         from ptmtools.parallel import map_in_order
 
-        images, folder = images_of(self.run), self.run.folder_url
+        assert self._transaction
+        start, run, transaction = time.perf_counter(), self.run, self._transaction
+        total, images, fewer = len(self._names), images_of(run), self._fewer
+        wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
+        opening: AbstractContextManager[Messages]
+        if run.remote and executor.machines:
+            opening = nullcontext(SharedUrl(self.options, run.remote.url, run.folder_url))
+        else:
+            opening = shared_disk(transaction, run.db.path, self.options, executor)
+        with opening as place:
 
-        def sent(i: int) -> ImageTask:
-            image, file = images[i], ""
-            if folder and image.files and remote.size(image.sha256) is None:
-                file = image.files[0]
-            if not file:
-                remote.provide(image.sha256, image.load)
-            return ImageTask(image.name, image.sha256, unresolved=self._fewer[i], file=file)
+            def send(i: int) -> TextureTask:
+                return place.send(run, images[i], i, fewer[i])
 
-        place = SharedUrl(self.options, remote.url, folder)
-        tasks = map_in_order(sent, wanted, OBJECTS_AHEAD)
-        return executor.each(encoded_at_url, place, tasks, releases_lock=True, chunk=chunk)
+            share = len(self._left) // (8 * executor.workers)
+            results = executor.each(
+                encode_texture,
+                place,
+                map_in_order(send, wanted, place.ahead),
+                releases_lock=True,
+                chunk=max(1, min(place.most_images, share)),
+            )
+            for result in results:
+                names = self._put(transaction, result)
+                run.progress(total - len(self._left), total, "textures")
+                transaction.finish(self._task(self._left.popleft()), names)
+        run.progress(total - len(self._left), total, "textures")
+        self._seconds += time.perf_counter() - start
+
+    def _put(self, transaction: Transaction, texture: EncodedTexture) -> list[str]:
+        """Stages the files of a texture; their names."""
+        from ptmtools.texture.container import read_header
+
+        run = self.run
+        for file in texture.files:
+            if file.data is not None:
+                transaction.put(file.name, file.data, file.sha256)
+            elif file.path:
+                transaction.take(file.name, Path(file.path), file.sha256)
+            else:
+                assert run.remote
+                run.remote.note(file.sha256, file.size)
+                if file.name:
+                    transaction.leave(file.name, file.sha256)
+        names = [file.name for file in texture.files if file.name]
+        run.cache(names[0], read_header(texture.head))
+        run.cache(names[1], read_steps(texture.steps))
+        return names
 
     def _task(self, i: int) -> str:
         """A digest of everything that the files of a texture depend on, their names included."""
@@ -371,11 +327,11 @@ class TexturesTurn(Turn):
         depends = [self._work.recipe, _coding(self._work), name, self._work.inputs[name]]
         return sha256(json.dumps(depends, sort_keys=True).encode())
 
-    def _stored(self, transaction: Transaction) -> Iterator[Stored]:
+    def _stored(self, transaction: Transaction) -> Iterator[StoredTexture]:
         """All textures, staged or committed."""
         from ptmtools.parallel import map_in_order
 
-        def one(name: str) -> Stored:
+        def one(name: str) -> StoredTexture:
             return stored_texture(self.run, name, transaction.source, transaction.read)
 
         return map_in_order(one, self._names, OBJECTS_AHEAD)
@@ -386,15 +342,18 @@ def stored_texture(
     name: str,
     source: Callable[[str], PtmSource],
     read: Callable[[str], bytes],
-) -> Stored:
+) -> StoredTexture:
     """The texture of a `.ptm`; ``source`` and ``read`` open files of the database."""
+    from ptmtools.texture.container import HEAD_MAX, read_header
+    from ptmtools.texture.sources import first_bytes
+
     ptm, steps = f"{SERVED}/{name}", steps_file(stem_of(name))
     with naming(artifacts.db.path / ptm):
-        header = artifacts.cached(ptm, lambda: header_of(source(ptm)))
-    return Stored(name, header, artifacts.cached(steps, lambda: read_steps(read(steps))))
+        header = artifacts.cached(ptm, lambda: read_header(first_bytes(source(ptm), HEAD_MAX)))
+    return StoredTexture(name, header, artifacts.cached(steps, lambda: read_steps(read(steps))))
 
 
-def counts_of(textures: Iterable[Stored]) -> dict[str, int]:
+def counts_of(textures: Iterable[StoredTexture]) -> dict[str, int]:
     """The counts of the stage."""
     counts = {"textures": 0, "raw_bytes": 0, "ptm_bytes": 0, "preview_bytes": 0, "kept_sources": 0}
     for texture in textures:
@@ -407,7 +366,7 @@ def counts_of(textures: Iterable[Stored]) -> dict[str, int]:
     return counts
 
 
-def notes_on_size(textures: Iterable[Stored], most: int) -> Iterator[str]:
+def notes_on_size(textures: Iterable[StoredTexture], most: int) -> Iterator[str]:
     """The texture farthest below ``--max-side``, where no level has that size: levels halve."""
     below = []
     for texture in textures:
@@ -422,14 +381,6 @@ def notes_on_size(textures: Iterable[Stored], most: int) -> Iterator[str]:
             f"sides halve from level to level: {name} has {width} x {height}; "
             f"{above[0]} x {above[1]} would add about {size(texture.estimated_bytes(*above))}"
         )
-
-
-def header_of(source: PtmSource) -> PtmHeader:
-    """The header of a `.ptm`; raises as `ranges_of` and `read_header`."""
-    from ptmtools.texture.container import HEAD_MAX, read_header
-    from ptmtools.texture.sources import first_bytes
-
-    return read_header(first_bytes(source, HEAD_MAX))
 
 
 class TexturesStage(Stage[None]):
