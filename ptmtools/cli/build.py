@@ -35,7 +35,7 @@ from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.records import NEVER_RUN, StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor
 from ptmtools.pipeline.stage import Stage
-from ptmtools.pipeline.stages import EMIT, STAGES
+from ptmtools.pipeline.stages import STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 from ptmtools.store.objects import is_url
@@ -264,7 +264,7 @@ def print_report(console: Console, report: BuildReport) -> None:
         )
     for line in visitor_lines(report.visitor):
         console.print(line)
-    if any(stage.stage == EMIT.name for stage in report.stages):
+    if report.visitor:
         _print_next_steps(console, report.database)
 
 

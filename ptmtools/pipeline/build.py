@@ -19,7 +19,7 @@ from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.records import StageReport
 from ptmtools.pipeline.report import BuildReport, Visitor, peak_memory
 from ptmtools.pipeline.stage import Options, Stage
-from ptmtools.pipeline.stages import EMIT, STAGES
+from ptmtools.pipeline.stages import STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.store.layout import MANIFEST
 from ptmtools.store.remote import folder_to_build, model_file
@@ -27,10 +27,6 @@ from ptmtools.store.writer import DatabaseWriter
 
 PathLike = str | os.PathLike[str]
 Tell = Callable[[StageReport], None]
-
-
-def _ignore(report: StageReport) -> None:
-    """The default of ``tell``."""
 
 
 def build_scene(
@@ -43,7 +39,7 @@ def build_scene(
     force: bool = False,
     rebuild: bool = False,
     progress: Progress = silent,
-    tell: Tell = _ignore,
+    tell: Tell | None = None,
 ) -> BuildReport:
     """Builds a database, or brings it up to date: only stages run whose inputs, options or recipe
     have changed, and only the textures are encoded that have changed.
@@ -91,7 +87,7 @@ def run_stage(
     scheduler: str | None = None,
     rebuild: bool = False,
     progress: Progress = silent,
-    tell: Tell = _ignore,
+    tell: Tell | None = None,
 ) -> BuildReport:
     """Runs the stage of a database whose options are given: ``PvsOptions()`` runs the visibility
     stage. The other parameters are those of `build_scene`."""
@@ -112,16 +108,16 @@ def chosen_options(options: Iterable[Options]) -> dict[Stage[Any], Options]:
 
     Raises TypeError for options of no stage, or two of the same stage.
     """
-    left = list(options)
+    given = list(options)
     chosen = {}
     for stage in STAGES.values():
-        own = [each for each in left if isinstance(each, stage.options)]
-        if len(own) > 1:
+        matching = [value for value in given if isinstance(value, stage.options)]
+        if len(matching) > 1:
             raise TypeError(f"the {stage.name} stage is given options twice")
-        chosen[stage] = own[0] if own else stage.options()
-        left = [each for each in left if each not in own]
-    if left:
-        raise TypeError(f"{left[0]!r} are the options of no stage")
+        chosen[stage] = matching[0] if matching else stage.options()
+        given = [value for value in given if value not in matching]
+    if given:
+        raise TypeError(f"{given[0]!r} are the options of no stage")
     return chosen
 
 
@@ -130,7 +126,7 @@ def _run(
     stages: list[Stage[Any]],
     options: dict[Stage[Any], Options],
     start: float,
-    tell: Tell,
+    tell: Tell | None,
 ) -> BuildReport:
     done = run.db.manifest.stages
     run.writer.provisional = all(STAGES[name].joined for name in done if name in STAGES) and (
@@ -155,7 +151,8 @@ def _run(
             reported = len(run.reports)
             turn.take()
             for report in run.reports[reported:]:
-                tell(report)
+                if tell:
+                    tell(report)
             finished.add(turn.stage)
             if i == 0:  # the model has been read
                 for later in turns[1:]:
@@ -167,6 +164,7 @@ def _run(
         raise
     if run.remote:
         run.remote.commit()
+    emitted = any("visit" in report.counts for report in run.reports)
     return BuildReport(
         model=run.db.manifest.model,
         database=run.remote.url if run.remote else str(run.db.path),
@@ -174,5 +172,5 @@ def _run(
         seconds=time.perf_counter() - start,
         peak_memory=peak_memory(),
         peak_memory_of_workers=peak_memory(of_workers=True),
-        visitor=Visitor.of(run.db.manifest) if EMIT in finished else None,
+        visitor=Visitor.of(run.db.manifest) if emitted else None,
     )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from ptmtools.pipeline.records import StageReport
-from ptmtools.pipeline.stages import EMIT, SCENE
 from ptmtools.quantities import size
 from ptmtools.store.manifest import Manifest
 
@@ -18,7 +18,8 @@ LARGER = 1.05
 
 @dataclass(frozen=True)
 class Visitor:
-    """The downloads of a visitor, beside the size of the source model, from the recorded counts.
+    """The downloads of a visitor, beside the size of the source model, from the counts that stages
+    have recorded as ``model_bytes``, ``image_bytes`` and ``visit``.
 
     Attributes
     ----------
@@ -34,11 +35,10 @@ class Visitor:
     @staticmethod
     def of(manifest: Manifest) -> Visitor | None:
         """None if nothing is served, or files of an earlier release."""
-        emitted, read = manifest.stages.get(EMIT.name), manifest.stages.get(SCENE.name)
-        visit = emitted.counts.get("visit") if emitted else None
+        counts = ChainMap(*(dict(record.counts) for record in manifest.stages.values()))
+        visit = counts.get("visit")
         if not isinstance(visit, Mapping):
             return None
-        counts = read.counts if read else {}
         return Visitor(counts.get("model_bytes"), counts.get("image_bytes"), visit)
 
     def lines(self) -> list[str]:

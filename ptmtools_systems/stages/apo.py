@@ -67,9 +67,9 @@ def _row(file: str, replaced: ReplacedObject, octree: Octree) -> tuple[dict[str,
     """The row of an octree in the list, and its stream."""
     import numpy as np
 
-    from ptmtools_systems.apo.files import streamed
+    from ptmtools_systems.apo.files import encode_stream
 
-    data, levels = streamed(octree.texels, octree)
+    data, levels = encode_stream(octree.texels, octree)
     row = {
         "object": replaced.name,
         "number": replaced.object,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
     from ptmtools_systems.apo.normal_map import NormalMap
-    from ptmtools_systems.apo.reliefs import Replacing
+    from ptmtools_systems.apo.replacing import Replacing
 
 #: A greater share of texels whose rays miss the original is reported.
 _MISSED = 0.01
@@ -46,7 +46,7 @@ class Mapped:
     options: TextureOptions
 
 
-def mapped(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
+def bake_map(shared: Mapped, task: tuple[int, str]) -> tuple[NormalMap, list[tuple[str, bytes]]]:
     """The normal map of an object, and its files as `encode_image` returns them."""
     number, stem = task
     relief = shared.replacing.normal_map(number)
@@ -100,8 +100,7 @@ class ReliefStage(Stage["ObjectMaps"]):
         objects = scene_origin(run).objects
         if not len(objects) or run.recorded(APO).relief != "normal-map":
             return complete(work, {"maps": 0}, ())
-        from ptmtools_systems.apo.reliefs import Replacing, object_maps
-        from ptmtools_systems.apo.replacing import apo_options
+        from ptmtools_systems.apo.replacing import Replacing, apo_options, object_maps
 
         # Workers need no images.
         scene, shown = replace(run.original(SCENE), images=()), replace(run[APO], images=())
@@ -109,7 +108,7 @@ class ReliefStage(Stage["ObjectMaps"]):
         names = [shown.objects[number] for number in objects.tolist()]
         tasks = list(zip(objects.tolist(), relief_stems(names), strict=True))
         shared = Mapped(replacing, run.recorded(TEXTURES))
-        maps, total = bake_textures(run, transaction, mapped, shared, tasks, "normal maps")
+        maps, total = bake_textures(run, transaction, bake_map, shared, tasks, "normal maps")
         notes = [note for pair in zip(names, maps, strict=True) for note in _notes(*pair)]
         reliefs = object_maps(shown, objects, maps)
         run.keep(self, reliefs)
