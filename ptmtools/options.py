@@ -70,18 +70,18 @@ def require_ranges(
 ) -> None:
     """As `require`, for fields between two numbers or at their defaults. The texts have in braces
     ``least`` and ``most``, the option's ``name``, the ``field`` in words and its ``value``."""
-    for key, (least, most) in ranges.items():
+    for key, (lower, upper) in ranges.items():
         value = getattr(options, key)
-        if value is not getattr(type(options), key) and not least <= value <= most:
-            words: dict[str, Any] = {"value": value, "least": least, "most": most}
+        if value is not getattr(type(options), key) and not lower <= value <= upper:
+            words: dict[str, Any] = {"value": value, "least": lower, "most": upper}
             words |= {"name": key.replace("_", "-"), "field": key.replace("_", " ")}
             require((False, fault.format(**words), remedy.format(**words) or None))
 
 
 def option_of(field: Field[Any]) -> OptionDeclaration:
     """The metadata of a field; empty if it was not declared by `option`."""
-    own: OptionDeclaration = field.metadata.get(_KEY, OptionDeclaration())
-    return own
+    declaration: OptionDeclaration = field.metadata.get(_KEY, OptionDeclaration())
+    return declaration
 
 
 def option_name(field: Field[Any]) -> str:
@@ -98,10 +98,11 @@ def arguments(options: Iterable[Any]) -> list[str]:
     """The command-line arguments that give these instances of options classes, without those that
     are defaults. Where several classes share an option, the last one counts."""
     given: dict[str, list[str]] = {}
-    for each in options:
-        for own in fields(each):
-            value, name, about = getattr(each, own.name), option_name(own), option_of(own)
-            if value == default_of(own):
+    for instance in options:
+        for member in fields(instance):
+            name, about = option_name(member), option_of(member)
+            value = getattr(instance, member.name)
+            if value == default_of(member):
                 continue
             if about.print:
                 value = about.print(value)
@@ -110,9 +111,9 @@ def arguments(options: Iterable[Any]) -> list[str]:
             if isinstance(value, bool):
                 given[name] = [f"--{name}" if value else f"--no-{name}"]
             else:
-                many = isinstance(value, (list, tuple)) and _repeated(type(each), own)
+                many = isinstance(value, (list, tuple)) and _may_repeat(type(instance), member)
                 values = value if many else [value]
-                given[name] = [word for one in values for word in (f"--{name}", _text(one))]
+                given[name] = [word for part in values for word in (f"--{name}", _text(part))]
     return [word for words in given.values() for word in words]
 
 
@@ -123,7 +124,7 @@ def degrees_text(radians: float) -> str:
     return next((text for text in texts if math.radians(float(text)) == radians), texts[-1])
 
 
-def _repeated(cls: type, field: Field[Any]) -> bool:
+def _may_repeat(cls: type, field: Field[Any]) -> bool:
     """Whether the option of a field may be given several times."""
     hint = typing.get_type_hints(cls)[field.name]
     return get_origin(hint) is tuple and get_args(hint)[-1] is Ellipsis

@@ -323,7 +323,7 @@ class Batch:
         self.console.to_stderr = any(job.to_stdout for job in jobs)
         at_once = min(workers, len(jobs))
 
-        def guarded(job: FileJob) -> Report | Exception:
+        def try_work(job: FileJob) -> Report | Exception:
             if job.fault:
                 return job.fault
             try:
@@ -331,7 +331,7 @@ class Batch:
             except Exception as fault:
                 return fault
 
-        return self.report(map_in_order(guarded, jobs, at_once), len(jobs), lines)
+        return self.report(map_in_order(try_work, jobs, at_once), len(jobs), lines)
 
     def report(
         self,

@@ -269,12 +269,12 @@ def print_report(console: Console, report: BuildReport) -> None:
 
 
 def _print_next_steps(console: Console, database: str) -> None:
-    ptm, db = _invoked(), shlex.quote(database)
+    ptm, db = _program_name(), shlex.quote(database)
     console.print("")
     console.print(f"Database: {db}. Next steps:")
     if is_url(database):
         first = f"{ptm} publish {db} -o site", "write a web site"
-    elif all((Path(database) / SERVED / own).exists() for own in GLTF.owns):
+    elif all((Path(database) / SERVED / output).exists() for output in GLTF.owns):
         first = f"{ptm} serve {db} --open", "walk through it in a browser"
     else:
         first = f"{ptm} emit {db} --format vrml,gltf", "also write the files of `ptm serve`"
@@ -312,7 +312,7 @@ def _tasks(stage: StageReport) -> str:
     return f"; {total - kept - resumed:,} encoded, {kept:,} unchanged{taken}"
 
 
-def _invoked() -> str:
+def _program_name() -> str:
     """The word by which the user called this command: ``ptm``, or a path if it is not on PATH."""
     called = sys.argv[0]
     on_path = shutil.which("ptm")

@@ -68,7 +68,7 @@ class Option(click.Option):
         takes_value = not self.is_flag
         default = self._shown_default
         if default is None and takes_value and not callable(self.default):
-            default = _shown(self.default)
+            default = _default_text(self.default)
         text = (self.help or "") + (f"  [default: {default}]" if default else "")
         return f"{names} {self._placeholder()}" if takes_value else names, text
 
@@ -87,7 +87,7 @@ class Command(click.Command):
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         super().__init__(*arguments, **settings)
-        if any(not getattr(each, "basic", True) for each in self.params):
+        if any(not getattr(parameter, "basic", True) for parameter in self.params):
             every = Option(
                 ["--help-all"],
                 is_flag=True,
@@ -102,18 +102,18 @@ class Command(click.Command):
         """Writes the options under their headings."""
         sections: dict[str, list[tuple[str, str]]] = {}
         omitted = 0
-        for each in self.get_params(ctx):
-            record = each.get_help_record(ctx) if isinstance(each, click.Option) else None
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
             if record is None:
                 continue
-            if ctx.meta.get(HELP_ALL) or getattr(each, "basic", True):
-                sections.setdefault(getattr(each, "heading", GENERAL), []).append(record)
+            if ctx.meta.get(HELP_ALL) or getattr(parameter, "basic", True):
+                sections.setdefault(getattr(parameter, "heading", GENERAL), []).append(record)
             else:
                 omitted += 1
         sections[GENERAL] = sections.pop(GENERAL, [])
-        for each in self.params:
-            if isinstance(each, Option) and each.values:
-                sections[f"Values of {each.opts[0]}"] = list(each.values)
+        for parameter in self.params:
+            if isinstance(parameter, Option) and parameter.values:
+                sections[f"Values of {parameter.opts[0]}"] = list(parameter.values)
         width = min(30, max(len(names) for rows in sections.values() for names, _ in rows))
         for heading, rows in sections.items():
             with formatter.section(heading):
@@ -176,12 +176,12 @@ class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
         given, comma, last = incomplete.rpartition(",") if self.several else ("", "", incomplete)
         return [
             CompletionItem(given + comma + name, help=about)
-            for name, about in self.explained
+            for name, about in self.descriptions
             if name.startswith(last) and name not in given.split(",")
         ]
 
     @property
-    def explained(self) -> list[tuple[str, str]]:
+    def descriptions(self) -> list[tuple[str, str]]:
         """(name, description) of each value."""
         return [(name, declared.about) for name, declared in self.table.items()]
 
@@ -277,21 +277,21 @@ def _option(field: Field[Any], hint: Any, **settings: Any) -> Decorator:
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if hint is bool:
         return option(f"--{name}/--no-{name}", _variable(name), **settings)
-    settings |= _typed(about, hint)
+    settings |= _settings_of_type(about, hint)
     if about.degrees and default is not None:
         settings["shown_default"] = f"{math.degrees(default):.4g}"
     return option(f"--{name}", _variable(name), **settings)
 
 
-def _typed(about: OptionDeclaration, hint: Any) -> dict[str, Any]:
+def _settings_of_type(about: OptionDeclaration, hint: Any) -> dict[str, Any]:
     """The settings of an option that follow from its declaration and the type of the field."""
     if about.choices is not None:
         named = Named(about.choices, several=about.several)
         metavar = "NAME[,NAME]" if about.several else f"[{'|'.join(about.choices)}]"
         settings = {"type": named, "metavar": metavar}
-        if len(named.explained) > INLINE_VALUES:
-            return {**settings, "help": f"{about.help}; see below.", "values": named.explained}
-        values = ", ".join(f"{name} ({text})" for name, text in named.explained)
+        if len(named.descriptions) > INLINE_VALUES:
+            return {**settings, "help": f"{about.help}; see below.", "values": named.descriptions}
+        values = ", ".join(f"{name} ({text})" for name, text in named.descriptions)
         return {**settings, "help": f"{about.help}: {values}."}
     if about.degrees:
         return {"type": Degrees()}
@@ -309,12 +309,12 @@ def _typed(about: OptionDeclaration, hint: Any) -> dict[str, Any]:
     return {"type": parts[0], "multiple": True}
 
 
-def _shown(value: Any) -> str:
+def _default_text(value: Any) -> str:
     """A default as the user would give it; "" for none."""
     if value is None or value == () or type(value).__name__ == "Sentinel":
         return ""
     if isinstance(value, (tuple, list)):
-        return ",".join(map(_shown, value))
+        return ",".join(map(_default_text, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

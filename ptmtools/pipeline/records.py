@@ -67,9 +67,9 @@ def parameters(options: Any) -> dict[str, Any]:
     if not is_dataclass(options) or isinstance(options, type):
         raise TypeError(f"{options!r} is not an options dataclass")
     plain = asdict(options)
-    for each in fields(options):
-        if not each.compare:
-            del plain[each.name]
+    for member in fields(options):
+        if not member.compare:
+            del plain[member.name]
     result: dict[str, Any] = json.loads(json.dumps(plain))
     return result
 
@@ -84,29 +84,29 @@ def options_of(kind: type[O], record: StageRecord) -> O:
     hints = typing.get_type_hints(kind)
     values: dict[str, Any] = {}
     try:
-        for each in fields(typing.cast(Any, kind)):
-            if each.name in record.parameters and each.compare:
-                values[each.name] = _restored(hints[each.name], record.parameters[each.name])
+        for member in fields(typing.cast(Any, kind)):
+            if member.name in record.parameters and member.compare:
+                values[member.name] = _restore(hints[member.name], record.parameters[member.name])
         return kind(**values)
     except (PtmError, AttributeError, LookupError, TypeError) as fault:
         raise ValueError(str(fault)) from fault
 
 
-def _restored(hint: Any, value: Any) -> Any:
+def _restore(hint: Any, value: Any) -> Any:
     """The option of type ``hint`` that JSON holds as ``value``; raises TypeError if there is
     none."""
     parts = get_args(hint)
     if get_origin(hint) in (Union, UnionType):
         for part in parts:
             with suppress(TypeError):
-                return _restored(part, value)
+                return _restore(part, value)
     elif get_origin(hint) is tuple and isinstance(value, list):
         inner = [parts[0]] * len(value) if parts[-1] is Ellipsis else parts
         if len(inner) == len(value):
-            return tuple(map(_restored, inner, value))
+            return tuple(map(_restore, inner, value))
     elif isinstance(hint, type) and is_dataclass(hint) and isinstance(value, dict):
         hints = typing.get_type_hints(hint)
-        return hint(**{name: _restored(hints.get(name), each) for name, each in value.items()})
+        return hint(**{name: _restore(hints.get(name), part) for name, part in value.items()})
     elif (
         (get_origin(hint) is Literal and value in parts)
         or type(value) is hint
@@ -140,7 +140,7 @@ def reasons(
     for change, files in _changed_files(before.inputs, work.inputs).items():
         # Other options may need fewer inputs, which is no further reason.
         if files and not (options and change == "removed"):
-            lines.append(f"{_listed(files)} {change}")
+            lines.append(f"{_file_names(files)} {change}")
     if not lines and (lost := db.first_damage(before.outputs)):
         lines.append(f"{lost} is missing or damaged")
     return tuple(lines)
@@ -155,7 +155,7 @@ def _changed_files(before: Mapping[str, str], after: Mapping[str, str]) -> dict[
     }
 
 
-def _listed(files: list[str]) -> str:
+def _file_names(files: list[str]) -> str:
     more = f" and {len(files) - _NAMED:,} more" if len(files) > _NAMED else ""
     return ", ".join(files[:_NAMED]) + more
 

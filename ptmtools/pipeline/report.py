@@ -58,20 +58,20 @@ class Visitor:
                 f"source model, for comparison: {size(whole)}{parts if self.images else ''}"
             )
 
-        def compared(count: int) -> str:
+        def compare_size(count: int) -> str:
             larger = whole and count > LARGER * whole
             return size(count) + (", more than the source model" if larger else "")
 
         if visit["browser"] is not None:
-            lines.append(f"a VRML browser downloads {compared(visit['browser'])}")
-        lines.append(f"the first room is complete after {compared(visit['first_room'])}")
+            lines.append(f"a VRML browser downloads {compare_size(visit['browser'])}")
+        lines.append(f"the first room is complete after {compare_size(visit['first_room'])}")
         if visit.get("simplified") is not None:
             lines.append(f"with simplified meshes it is drawn after {size(visit['simplified'])}")
         for key, when in (("mean", "on average"), ("most", "at most")):
             shares = f"{visit[f'{key}_volume']:.1%} of the volume"
             if visit[f"{key}_texels"] is not None:
                 shares += f" and {visit[f'{key}_texels']:.1%} of the texels"
-            lines.append(f"in memory {when}: {shares}, {compared(visit[f'{key}_at_hand'])}")
+            lines.append(f"in memory {when}: {shares}, {compare_size(visit[f'{key}_at_hand'])}")
         if "everything" in visit:
             lines.append(
                 f"in order of coverage: 90% of the average view after {size(visit['mean_90'])}, "
@@ -89,8 +89,8 @@ _GAIN = 0.4
 def _gain(visit: Mapping[str, Any]) -> str:
     """Whether visible sets, their order, levels of detail or the resolution of textures saves a
     visitor most; empty if nothing does."""
-    whole, held = max(visit["everything"], 1), max(visit["mean_at_hand"], 1)
-    by_cells, by_order = 1 - held / whole, 1 - visit["mean_99"] / held
+    whole, at_hand = max(visit["everything"], 1), max(visit["mean_at_hand"], 1)
+    by_cells, by_order = 1 - at_hand / whole, 1 - visit["mean_99"] / at_hand
     room, drawn = max(visit["first_room"], 1), visit.get("simplified")
     by_meshes = 0.0 if drawn is None else 1 - drawn / room
     if drawn is not None and by_meshes > max(_GAIN, by_cells, by_order):
@@ -99,14 +99,14 @@ def _gain(visit: Mapping[str, Any]) -> str:
         if visit["mean_texels"] is None:
             return ""
         return (
-            f"resolution; visitors hold {held / whole:.0%} of the model, and cells in order of "
+            f"resolution; visitors hold {at_hand / whole:.0%} of the model, and cells in order of "
             "coverage save little"
         )
     if by_cells >= by_order:
-        return f"visible sets; visitors hold {held / whole:.0%} of the model"
+        return f"visible sets; visitors hold {at_hand / whole:.0%} of the model"
     return (
         f"the order of cells; 99% of the view takes {1 - by_order:.0%} of what visitors hold, "
-        f"which is {held / whole:.0%} of the model"
+        f"which is {at_hand / whole:.0%} of the model"
     )
 
 

@@ -227,7 +227,7 @@ def changes_of(stage: Stage[Any]) -> tuple[Stage[Any], ...]:
     """The stages of other packages that change the artifact of a stage, in the order of their
     runs."""
     declared = plugins.declarations("stages", Stage).values()
-    return tuple(other for other in declared if other.changes is stage)
+    return tuple(change for change in declared if change.changes is stage)
 
 
 def changes_before(reader: Stage[Any], stage: Stage[Any]) -> tuple[Stage[Any], ...]:

@@ -98,14 +98,14 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
         artifacts = Artifacts(db)
         stages = tuple(_status(artifacts, stage) for stage in STAGES.values())
         db.digests.save()
-        held = is_held(folder)
+        locked = is_held(folder)
         return DatabaseStatus(
             database=os.fspath(path),
             model=manifest.model if manifest else None,
             stages=stages,
             finished=all(stage.state == "done" for stage in stages),
-            writer=str(holder(folder) or "an unknown process") if held else None,
-            interrupted=begun and not held,
+            writer=str(holder(folder) or "an unknown process") if locked else None,
+            interrupted=begun and not locked,
             waiting=finished_tasks(folder),
         )
 

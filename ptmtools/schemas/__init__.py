@@ -122,7 +122,7 @@ def parse(data: bytes) -> Any:
 
 def check(document: Any, name: str) -> None:
     """Raises ShapeError if a document violates the schema ``name``."""
-    _compiled(name)(document)
+    _check_of(name)(document)
 
 
 def _not_finite(number: str) -> None:
@@ -141,7 +141,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 @cache
-def _compiled(name: str) -> Check:
+def _check_of(name: str) -> Check:
     schema = json.loads(schema_text(name))
     return _compile(schema, schema)
 
@@ -159,8 +159,8 @@ def _compile(schema: Schema | bool, root: Schema) -> Check:
         return checks[0]
 
     def check_all(value: Any) -> None:
-        for one in checks:
-            one(value)
+        for check in checks:
+            check(value)
 
     return check_all
 
@@ -184,10 +184,10 @@ def _nothing(value: Any) -> None:
 
 
 def _reference(schema: Schema, root: Schema) -> Check:
-    return _compile(_resolved(schema, root), root)
+    return _compile(_resolve(schema, root), root)
 
 
-def _resolved(schema: Any, root: Schema) -> Any:
+def _resolve(schema: Any, root: Schema) -> Any:
     """The schema that a reference names; any other schema itself."""
     if isinstance(schema, bool) or "$ref" not in schema:
         return schema
@@ -205,9 +205,9 @@ def _type(schema: Schema, root: Schema) -> Check:
 
     def check_type(value: Any) -> None:
         if type(value) not in types:
-            raise ShapeError(f"{_shown(value)} is not of type {wanted}")
+            raise ShapeError(f"{_excerpt(value)} is not of type {wanted}")
         if type(value) in _NUMBERS and not -_LARGEST <= value <= _LARGEST:
-            raise ShapeError(f"{_shown(value)} is not finite")
+            raise ShapeError(f"{_excerpt(value)} is not finite")
 
     return check_type
 
@@ -217,8 +217,8 @@ def _one_of(schema: Schema, root: Schema) -> Check:
     known = schema["enum"] if "enum" in schema else [schema["const"]]
 
     def check_known(value: Any) -> None:
-        if not any(type(value) is type(one) and value == one for one in known):
-            raise ShapeError(f"{_shown(value)} is not {' or '.join(map(repr, known))}")
+        if not any(type(value) is type(constant) and value == constant for constant in known):
+            raise ShapeError(f"{_excerpt(value)} is not {' or '.join(map(repr, known))}")
 
     return check_known
 
@@ -232,7 +232,7 @@ def _bounds(schema: Schema, root: Schema) -> Check:
             if type(value) in types:
                 size = value if types is _NUMBERS else len(value)
                 if not holds(size, bound):
-                    raise ShapeError(f"{_shown(size)} {fault} {bound}")
+                    raise ShapeError(f"{_excerpt(size)} {fault} {bound}")
 
     return check_bounds
 
@@ -243,7 +243,7 @@ def _pattern(schema: Schema, root: Schema) -> Check:
 
     def check_pattern(value: Any) -> None:
         if type(value) is str and not search(value):
-            raise ShapeError(f"{_shown(value)} does not match {schema['pattern']}")
+            raise ShapeError(f"{_excerpt(value)} does not match {schema['pattern']}")
 
     return check_pattern
 
@@ -252,7 +252,7 @@ def _object_fields(schema: Schema, root: Schema) -> Check:
     """`required`, `properties`, `additionalProperties` and `propertyNames` together."""
     required: list[str] = schema.get("required", [])
     fields = {n: _compile(s, root) for n, s in schema.get("properties", {}).items()}
-    other = _compile(schema.get("additionalProperties", True), root)
+    check_other = _compile(schema.get("additionalProperties", True), root)
     check_name = _compile(schema.get("propertyNames", True), root)
 
     def check_fields(value: Any) -> None:
@@ -264,7 +264,7 @@ def _object_fields(schema: Schema, root: Schema) -> Check:
         for name, inner in value.items():
             try:
                 check_name(name)
-                fields.get(name, other)(inner)
+                fields.get(name, check_other)(inner)
             except ShapeError as fault:
                 raise fault.under(name) from None
 
@@ -274,7 +274,7 @@ def _object_fields(schema: Schema, root: Schema) -> Check:
 def _items(schema: Schema, root: Schema) -> Check:
     """`items` and `prefixItems` together."""
     first = [_compile(s, root) for s in schema.get("prefixItems", [])]
-    rest = _resolved(schema.get("items", True), root)
+    rest = _resolve(schema.get("items", True), root)
     check_rest = _compile(rest, root)
     all_valid = _numbers(rest) if not first else lambda values: False
 
@@ -310,7 +310,7 @@ def _numbers(schema: Schema | bool) -> Callable[[list[Any]], bool]:
     return all_valid
 
 
-def _shown(value: Any) -> str:
+def _excerpt(value: Any) -> str:
     if isinstance(value, (dict, list)):
         return "an object" if isinstance(value, dict) else "a list"
     text = json.dumps(value)

@@ -179,7 +179,7 @@ def test_an_image_is_decoded_once(made: Path, monkeypatch: pytest.MonkeyPatch) -
     lights = light_stage.lights_of(artifacts)
     assert lights is not None
     maps = [replace(lights.maps[0], strength=share) for share in (1, 0.5, 0.25)]
-    painted = light_stage._painted(cast("Any", artifacts), replace(lights, maps=tuple(maps)))
+    painted = light_stage._paint(cast("Any", artifacts), replace(lights, maps=tuple(maps)))
     assert [image.strength for image in painted.images] == [1, 0.5, 0.25]
     assert len(lengths) == 1
 

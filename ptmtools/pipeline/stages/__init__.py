@@ -24,20 +24,20 @@ __all__ = ["ACH", "CELLS", "EMIT", "LIGHT", "PVS", "SCENE", "STAGES", "TEXTURES"
 if TYPE_CHECKING:
     STAGES: dict[str, Stage[Any]]
 
-_OWN: tuple[Stage[Any], ...] = (SCENE, CELLS, PVS, ACH, TEXTURES, LIGHT, EMIT)
+BUILT_IN: tuple[Stage[Any], ...] = (SCENE, CELLS, PVS, ACH, TEXTURES, LIGHT, EMIT)
 
 
 def __getattr__(name: str) -> Any:
     """`STAGES`, which imports the stages of other packages, and is made when it is first used."""
     if name != "STAGES":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    table = globals()["STAGES"] = {stage.name: stage for stage in _ordered()}
+    table = globals()["STAGES"] = {stage.name: stage for stage in _sorted_stages()}
     return table
 
 
-def _ordered() -> list[Stage[Any]]:
+def _sorted_stages() -> list[Stage[Any]]:
     """All stages, each after those that it depends on."""
-    stages = list(_OWN)
+    stages = list(BUILT_IN)
     for stage in plugins.declarations("stages", Stage).values():
         needed = [*stage.sources(stage.options()), *stage.heeds]
         if stage.changes:

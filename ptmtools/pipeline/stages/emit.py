@@ -69,7 +69,7 @@ def _need(
     return compute_need(scene, run[CELLS], run[PVS], sizes, options.need, run.progress)
 
 
-def _represented(run: Artifacts) -> Iterator[Represented]:
+def _representations(run: Artifacts) -> Iterator[Represented]:
     for stage in representing():
         if represented := stage.represented(run):
             yield represented
@@ -156,7 +156,7 @@ class EmitStage(Stage[None]):
 
         light, scene = run.stored(LIGHT), run[SCENE]
         images = texture_records(run)
-        represented = tuple(_represented(run))
+        represented = tuple(_representations(run))
         maps = tuple(texture for kind in represented for texture in kind.textures)
         places = object_maps(represented)
         textures = (*images, *lightmap_records(run, light), *maps)

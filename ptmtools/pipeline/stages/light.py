@@ -55,7 +55,7 @@ class LitCells:
     options: TextureOptions
 
 
-def lit(
+def bake_cell(
     shared: LitCells, task: tuple[int, CellSurfaces]
 ) -> tuple[CellLight, list[tuple[str, bytes]]]:
     """The light of a cell, and the files of its lightmap as `encode_image` returns them; none
@@ -80,7 +80,7 @@ _NO_LIGHT = {"lightmaps": 0, "light": "none"}
 def _baking(
     run: Run,
     options: LightOptions,
-    own: Lights | None,
+    model_light: Lights | None,
     lights: Lights | None,
     pieces: list[CellSurfaces],
 ) -> LightBaking:
@@ -92,8 +92,8 @@ def _baking(
 
     scene = run[SCENE]
     around = Occluders.from_scene(scene)
-    if own:
-        return LightBaking(around, options, painted=_painted(run, own))
+    if model_light:
+        return LightBaking(around, options, painted=_paint(run, model_light))
     lamps = lamps_of(scene, lights)
     return LightBaking(around, options, light_mix(around, pieces, lamps, options, ABOVE, WHITE))
 
@@ -117,18 +117,18 @@ def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> ND
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
     if lights is None:
         return glass
-    own = glass | lights.unlit
-    return own | (lights.map < 0 if painted else lamp_luminance(scene, lights) > 0)
+    dark = glass | lights.unlit
+    return dark | (lights.map < 0 if painted else lamp_luminance(scene, lights) > 0)
 
 
-def _painted(run: Run, lights: Lights) -> PaintedLight:
+def _paint(run: Run, lights: Lights) -> PaintedLight:
     """The lightmaps of the model, for the faces of the scene with replaced objects."""
     import numpy as np
 
     from ptmtools.light.looks import LightImage, PaintedLight, red_texels
 
     scene = run.original(SCENE)
-    files = {each.data for each in lights.maps}
+    files = {lightmap.data for lightmap in lights.maps}
     decoded = {data: red_texels(data, _MOST, "lightmap") for data in files}
     images = tuple(LightImage(decoded[k.data], k.wrap, k.strength) for k in lights.maps)
     image = lights.map[scene.triangle_material]
@@ -136,7 +136,7 @@ def _painted(run: Run, lights: Lights) -> PaintedLight:
     return PaintedLight(scene.corners, uv, image, images, scene_origin(run).triangle)
 
 
-def _about(baking: LightBaking) -> Mapping[str, Any]:
+def _kind_of_light(baking: LightBaking) -> Mapping[str, Any]:
     """What the light consists of."""
     if baking.painted is not None:
         return {"light": "model"}
@@ -232,12 +232,12 @@ class LightStage(Stage["Light"]):
 
         scene, cells = run[SCENE], run[CELLS]
         lights = lights_of(run)
-        own = lights if lights and lights.maps and options.light != "bake" else None
-        unlit = unlit_materials(scene, lights, painted=own is not None)
+        model_light = lights if lights and lights.maps and options.light != "bake" else None
+        unlit = unlit_materials(scene, lights, painted=model_light is not None)
         asked = options.light_density
         replaced = scene_origin(run).objects
         pieces = pieces_of(Geometry(scene, cells), cells, unlit, 1 / asked, replaced)
-        if options.light == "auto" and not own:
+        if options.light == "auto" and not model_light:
             density = affordable_density(pieces, asked, round_bytes(image_bytes(run)))
             if not density:
                 least = round(expected_bytes(pieces, LEAST * asked))
@@ -248,10 +248,10 @@ class LightStage(Stage["Light"]):
             remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
             work = replace(work, inputs={**work.inputs, _ABSENT: ""})
             return complete(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
-        baking = _baking(run, options, own, lights, pieces)
+        baking = _baking(run, options, model_light, lights, pieces)
         shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
-        cell_lights, total = bake_textures(run, transaction, lit, shared, tasks, "light")
+        cell_lights, total = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
         artifact = Light(
             np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
             np.concatenate([light.mapped for light in cell_lights]),
@@ -260,7 +260,7 @@ class LightStage(Stage["Light"]):
         )
         run.keep(LIGHT, artifact)
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
-        counts = {**self.counts(artifact), "ptm_bytes": total, **_about(shared.baking)}
+        counts = {**self.counts(artifact), "ptm_bytes": total, **_kind_of_light(shared.baking)}
         if options.light_density < asked:
             counts["reduced_density"] = options.light_density
         return complete(work, counts, _notes(cell_lights))

@@ -40,11 +40,11 @@ class PvsStage(Stage["Pvs"]):
         return compute_pvs(*args)
 
     def counts(self, pvs: Pvs) -> Counts:
-        mean, most = pvs.volume_at_hand
+        mean, largest = pvs.volume_at_hand
         return {
             "average_share": pvs.average_share,
             "mean_volume": mean,
-            "most_volume": most,
+            "most_volume": largest,
             "fallbacks": pvs.fallbacks,
             "ties": int(pvs.ties.sum()),
             "decided": int(pvs.decided.sum()),

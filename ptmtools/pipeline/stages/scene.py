@@ -101,7 +101,7 @@ def _digests(model: Path, names: Iterable[str], digests: Digests) -> dict[str, s
     return result
 
 
-def _repainted(artifacts: Artifacts, work: StageRecord) -> dict[int, str] | None:
+def _find_repainted(artifacts: Artifacts, work: StageRecord) -> dict[int, str] | None:
     """Row in the list → file of the repainted images, if the contents of plain images are all that
     has changed since the last run; else None."""
     before = artifacts.before(SCENE)
@@ -271,7 +271,7 @@ class SceneStage(Stage["Scene"]):
         from ptmtools.scene.model import SourceImage
         from ptmtools.scene.source import FileRange, HeldBytes
 
-        repainted = _repainted(run, work)
+        repainted = _find_repainted(run, work)
         if repainted is None:
             return None
         model, before, rows = _model_of(run), run.record(self), image_rows(run)
@@ -284,8 +284,8 @@ class SceneStage(Stage["Scene"]):
             limit = options.limit << 20
             if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"], limit):
                 return None
-            held = HeldBytes(data)
-            fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
+            source = HeldBytes(data)
+            fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], source, (name,), True)
         old = {f"{IMAGES}/{before.inputs[name]}" for name in repainted.values()} | {IMAGE_LIST}
         kept = {name: digest for name, digest in before.outputs.items() if name not in old}
         if not transaction.keep(kept):
@@ -313,7 +313,7 @@ class SceneStage(Stage["Scene"]):
 
     def foresee(self, artifacts: Artifacts, work: StageRecord) -> bool:
         """Known if only plain images were repainted."""
-        repainted = _repainted(artifacts, work)
+        repainted = _find_repainted(artifacts, work)
         if repainted is None:
             return False
         folder = _model_of(artifacts).parent

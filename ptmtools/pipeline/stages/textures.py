@@ -75,7 +75,7 @@ def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
     return [name for name in work.inputs if before.inputs.get(name) != work.inputs[name]]
 
 
-def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
+def unresolved_level_counts(artifacts: Artifacts, options: TextureOptions) -> list[int]:
     """The number of the finest levels of each image that ``--trim`` leaves out.
 
     Raises as `Artifacts`.
@@ -148,7 +148,7 @@ class StoredTexture:
         return sizes[sizes.index(self.finest[:2]) + 1 :]
 
 
-def _trimmed(
+def _trim_counts(
     textures: Iterable[StoredTexture], options: TextureOptions
 ) -> tuple[dict[str, int], list[str]]:
     """The counts of ``--trim``: the textures with levels left out, and the decoded bytes by which
@@ -232,7 +232,7 @@ class TexturesTurn(Turn):
             self.encode(self.run.workers.executor)
         if transaction := self._transaction:
             textures = list(self._stored(transaction))
-            counts, notes = _trimmed(textures, self.options)
+            counts, notes = _trim_counts(textures, self.options)
             notes = [*notes_on_size(textures, self.options.max_side), *notes]
             record = replace(self._work, counts={**counts_of(textures), **counts}, notes=notes)
             self.run.settle(self.stage, transaction, record)
@@ -245,7 +245,7 @@ class TexturesTurn(Turn):
         self._prepared = True
         self._work, self._why = self.planned()
         self._names = list(self._work.inputs)
-        self._fewer = unresolved(self.run, self.options)
+        self._fewer = unresolved_level_counts(self.run, self.options)
         self._tasks = (len(self._names), len(self._names), 0)
         if not self._why:
             return
@@ -256,8 +256,8 @@ class TexturesTurn(Turn):
         stale = set(stale_textures(before, self._work))
         files = _files_by_stem(before)
         for i, name in enumerate(self._names):
-            own = files.get(stem_of(name))
-            if own and name not in stale and transaction.keep(own):
+            stored_files = files.get(stem_of(name))
+            if stored_files and name not in stale and transaction.keep(stored_files):
                 kept += 1
             elif transaction.resume(self._task(i)):
                 resumed += 1
@@ -366,19 +366,19 @@ def counts_of(textures: Iterable[StoredTexture]) -> dict[str, int]:
     return counts
 
 
-def notes_on_size(textures: Iterable[StoredTexture], most: int) -> Iterator[str]:
+def notes_on_size(textures: Iterable[StoredTexture], side_limit: int) -> Iterator[str]:
     """The texture farthest below ``--max-side``, where no level has that size: levels halve."""
     below = []
     for texture in textures:
         width, height, _ = texture.finest
-        if (finer := texture.finer()) and max(width, height) < most:
+        if (finer := texture.finer()) and max(width, height) < side_limit:
             below.append((max(width, height), texture.name, texture, finer[0]))
     if below:
-        _, name, texture, above = min(below, key=lambda each: each[:2])
+        _, name, texture, above = min(below, key=lambda row: row[:2])
         width, height, _ = texture.finest
         yield (
-            f"--max-side {most} keeps less than that of {count(len(below), 'texture')}, because "
-            f"sides halve from level to level: {name} has {width} x {height}; "
+            f"--max-side {side_limit} keeps less than that of {count(len(below), 'texture')}, "
+            f"because sides halve from level to level: {name} has {width} x {height}; "
             f"{above[0]} x {above[1]} would add about {size(texture.estimated_bytes(*above))}"
         )
 
@@ -409,7 +409,9 @@ class TexturesStage(Stage[None]):
         images = image_digests(artifacts)
         digests = [
             sha256(f"{digest} - {fewer}".encode()) if fewer else digest
-            for digest, fewer in zip(images.values(), unresolved(artifacts, options), strict=True)
+            for digest, fewer in zip(
+                images.values(), unresolved_level_counts(artifacts, options), strict=True
+            )
         ]
         return dict(zip(texture_files(images), digests, strict=True))
 
