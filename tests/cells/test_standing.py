@@ -209,4 +209,4 @@ def test_the_check_begins_where_a_camera_makes_a_leaf_stand(quads, room_faces, c
     standing[leaf] = camera
     here = cells.eye_floor[cells.eye_floor[:, :, 0].max(axis=1) < 25]
     cells = replace(cells, eye_floor=here, leaf_standing=standing)
-    assert _Eyes(cells).at(there, leaf).tolist() == [camera]
+    assert _Eyes(cells).may_be_at(there, leaf).tolist() == [camera]

@@ -32,8 +32,8 @@ prototype.readPixels = function (...given) {
 };
 Object.defineProperty(window, "ptm", { configurable: true, set(app) {
   Object.defineProperty(window, "ptm", { value: app });
-  const fence = { took: 0.001, busy: false, mark() {}, reached: () => false };
-  Object.defineProperty(app.walk, "fence", { get: () => fence, set() {} });
+  const fence = { took: 0.001, busy: false, mark() {}, reached: () => false, pause: () => 0 };
+  Object.defineProperty(app.walk.picture, "fence", { get: () => fence, set() {} });
 } });
 """
 
