@@ -67,7 +67,7 @@ BUDGET: dict[str, tuple[int, int]] = {
 }
 #: Functions of a package that are named by a participle, and by a preposition.
 NAMES: dict[str, tuple[int, int]] = {
-    "ptmtools": (31, 7),
+    "ptmtools": (12, 6),
     "ptmtools_systems": (3, 0),
     "ptmtools_lab": (4, 2),
     "ptmtools_samples": (0, 0),
