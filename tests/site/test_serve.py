@@ -200,7 +200,7 @@ def test_what_is_no_database_to_serve(tmp_path: Path, capsys: pytest.CaptureFixt
         (tmp_path / "nowhere", "PTM-D001", "there is no such database"),
         (empty, "PTM-D001", "neither a database, nor a folder that `ptm publish`"),
         (database(tmp_path / "unfinished", {"scene": RECORD}), "PTM-D004", "run `ptm build-scene"),
-        (database(tmp_path / "old", {"scene": RECORD}, 1), "PTM-D003", "build it again"),
+        (database(tmp_path / "old", {"scene": RECORD}, 1), "PTM-D003", "anew with --force"),
     ):
         status, printed = failing(capsys, path)
         assert status == 5
