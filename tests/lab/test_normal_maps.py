@@ -102,7 +102,7 @@ def test_the_light_on_a_wall(
         return np.tile(np.array(texel, np.float64), (len(sight.ray), 1))
 
     before = picture(plain(served))[60:90, 80:120]
-    monkeypatch.setattr(drawing, "_sampled", sampled)
+    monkeypatch.setattr(drawing, "_sample_maps", sampled)
     after = picture(served)[60:90, 80:120]
     expected = np.minimum(before * light(world) / light((0, 0, 1)), 255)
     assert np.abs(after - expected).max() <= 1.5
