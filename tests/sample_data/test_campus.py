@@ -92,7 +92,7 @@ def test_other_seed_other_bytes(campus: ModuleType, folder: Path) -> None:
 
 
 def test_forty_buildings_and_no_wall_twice_in_the_first_third(campus: ModuleType) -> None:
-    recipes = campus.chosen(campus.StreetOptions().buildings)
+    recipes = campus.choose_recipes(campus.StreetOptions().buildings)
     assert len(recipes) == 40
     assert len({r.name for r in recipes}) == 40
     walls = [r.look.wall for r in recipes]
