@@ -65,7 +65,9 @@ def test_a_message_or_a_picture(
         assert set(answers[-1]) <= {"PTM-V103", "PTM-V105", "PTM-V107", "notice"}, seed
         own = [said for said in visitor.messages if "Failed to load resource" not in said]
         assert not [said for said in own if said.startswith("error: ")], seed
-    assert count // 4 < sum(map(bool, answers)) < count
+    assert count // 4 < sum(map(bool, answers))
+    # Of few, each may be damaged where it shows; the more so where a slow machine shows more.
+    assert not many or not all(answers)
 
 
 def opening(
