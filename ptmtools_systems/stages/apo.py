@@ -231,7 +231,7 @@ class ReplacingStage(Stage["Scene"]):
         return {"triangles": len(scene.triangles)}
 
     def summary(self, n: Counts) -> str:
-        if not (objects := n["objects"]):
+        if not (objects := n.get("objects", n["octrees"])):  # 0.2.0 counts octrees only
             return "no object replaced"
         octrees = f"; {count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
         return (
