@@ -58,6 +58,9 @@ def test_a_message_or_a_picture(
     answers = []
     many = engine == "chromium" and form != "campus.json"
     count = int(os.environ.get("PTM_HOSTILE") or (COUNT if many else FEWER))
+    with opened(sites[form].entries, PLACES[form]) as visitor:
+        visitor.until(f"{SAYS.strip()} || {THERE[form]}")
+        assert visitor.page.evaluate(ANSWER) == []
     for seed in range(count):
         with opened(hostile(sites[form], seed), PLACES[form]) as visitor:
             visitor.until(f"{SAYS.strip()} || {THERE[form]}")
@@ -65,9 +68,9 @@ def test_a_message_or_a_picture(
         assert set(answers[-1]) <= {"PTM-V103", "PTM-V105", "PTM-V107", "notice"}, seed
         own = [said for said in visitor.messages if "Failed to load resource" not in said]
         assert not [said for said in own if said.startswith("error: ")], seed
+    # Each of eight sites may be damaged where it shows, not each of twenty.
     assert count // 4 < sum(map(bool, answers))
-    # Of few, each may be damaged where it shows; the more so where a slow machine shows more.
-    assert not many or not all(answers)
+    assert count <= FEWER or not all(answers)
 
 
 def opening(
