@@ -86,12 +86,12 @@ def hang(
     while len(order) < count:
         order += [int(k) for k in rng.permutation(len(aspects))]
     return [
-        _picture(f"painting_{i + 1:02d}", order[i], aspects[order[i]], actual[k], rng)
+        hang_picture(f"painting_{i + 1:02d}", order[i], aspects[order[i]], actual[k], rng)
         for i, k in enumerate(chosen)
     ]
 
 
-def _picture(
+def hang_picture(
     name: str, picture: int, aspect: float, place: FurnitureSpot, rng: np.random.Generator
 ) -> Thing:
     """A canvas in a closed frame of four mitred bars."""
@@ -143,10 +143,10 @@ def furnish(plan: Plan, rng: np.random.Generator) -> list[Thing]:
             name = f"statue_{len(statues) + 1:02d}"
             statues.append(Thing(name, kind(x, box.low[1] / 1000, z)))
         if rng.random() < 0.75:
-            benches.append(_bench(len(benches) + 1, box, 0.5, int(rng.integers(2))))
+            benches.append(bench(len(benches) + 1, box, 0.5, int(rng.integers(2))))
     for box in plan.of_kind("corridor"):
         benches += [
-            _bench(len(benches) + 1 + k, box, share, 0) for k, share in enumerate((0.3, 0.7))
+            bench(len(benches) + 1 + k, box, share, 0) for k, share in enumerate((0.3, 0.7))
         ]
     ground = next(box for box in plan.of_kind("corridor") if box.storey == 0)
     z = _metres_between(ground, 2, 0.5)
@@ -167,7 +167,7 @@ def _metres_between(box: PlanBox, axis: int, share: float) -> float:
     return round((box.low[axis] + (box.high[axis] - box.low[axis]) * share) / 1000, 2)
 
 
-def _bench(number: int, box: PlanBox, share: float, turned: int) -> Thing:
+def bench(number: int, box: PlanBox, share: float, turned: int) -> Thing:
     x, z, y = _metres_between(box, 0, share), _metres_between(box, 2, 0.5), box.low[1] / 1000
     a, b = (0.3, 0.9) if turned else (0.9, 0.3)
     faces = block("wood", (x - a, y + 0.38, z - b), (x + a, y + 0.46, z + b), 0.9)
@@ -266,7 +266,7 @@ def _guard(start: float, stop: float, y: float, rise: float, z: float) -> list[F
     return [tile_face("wood", tuple(loop), 1.5) for loop in loops]
 
 
-def _lathe(
+def lathe(
     x: float,
     y: float,
     z: float,
@@ -305,7 +305,7 @@ def _lathe(
     return faces
 
 
-def _smooth(
+def smooth_curve(
     knots: list[tuple[float, float, float]], per_span: int = 3
 ) -> list[tuple[float, float, float]]:
     """Catmull–Rom curve through the knots."""
@@ -328,7 +328,7 @@ def _smooth(
     return [*curve, knots[-1]]
 
 
-def _plinth(x: float, y: float, z: float, height: float, half: float = 0.3) -> list[Face]:
+def plinth(x: float, y: float, z: float, height: float, half: float = 0.3) -> list[Face]:
     """A base, a shaft and a cornice; touching faces are left out."""
     h, levels = half, [(0.0, 0.12, 0.06), (0.12, height - 0.08, 0.0), (height - 0.08, height, 0.04)]
     faces: list[Face] = []
@@ -351,7 +351,7 @@ def amphora(x: float, y: float, z: float) -> list[Face]:
         (0.9, 0.09, 0.09),
         (0.95, 0.14, 0.14),
     ]
-    return _plinth(x, y, z, 0.9) + _lathe(x, y + 0.9, z, _smooth(knots, 2), "terracotta")
+    return plinth(x, y, z, 0.9) + lathe(x, y + 0.9, z, smooth_curve(knots, 2), "terracotta")
 
 
 def figure(x: float, y: float, z: float) -> list[Face]:
@@ -370,7 +370,7 @@ def figure(x: float, y: float, z: float) -> list[Face]:
         (1.74, 0.09, 0.1),
         (1.82, 0.03, 0.03),
     ]
-    return _plinth(x, y, z, 0.6, 0.32) + _lathe(x, y + 0.6, z, _smooth(knots, 2), "marble")
+    return plinth(x, y, z, 0.6, 0.32) + lathe(x, y + 0.6, z, smooth_curve(knots, 2), "marble")
 
 
 def bust(x: float, y: float, z: float) -> list[Face]:
@@ -387,13 +387,13 @@ def bust(x: float, y: float, z: float) -> list[Face]:
         (0.74, 0.07, 0.08),
         (0.77, 0.02, 0.02),
     ]
-    return _plinth(x, y, z, 1.15, 0.24) + _lathe(x, y + 1.15, z, _smooth(knots, 2), "marble")
+    return plinth(x, y, z, 1.15, 0.24) + lathe(x, y + 1.15, z, smooth_curve(knots, 2), "marble")
 
 
 def column(x: float, y: float, z: float) -> list[Face]:
     """A twisted pillar, four-sided at the foot and round at the top."""
     profile = [(0.09 * k, 0.24 - 0.012 * k, 0.12 + 0.002 * k) for k in range(19)]
-    return _plinth(x, y, z, 0.5) + _lathe(x, y + 0.5, z, profile, "bronze", 16, twist=1.6)
+    return plinth(x, y, z, 0.5) + lathe(x, y + 0.5, z, profile, "bronze", 16, twist=1.6)
 
 
 STATUES: list[Callable[[float, float, float], list[Face]]] = [amphora, figure, bust, column]

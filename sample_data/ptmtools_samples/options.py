@@ -157,3 +157,13 @@ class WebGalleryOptions(Ranged):
     statue_triangles: int = option(12_000, "Approximate number of triangles of each statue.")
     scale: float = option(1.0, "Scale of the sizes of the images.")
     seed: int = option(1, _SEED)
+
+
+@dataclass(frozen=True)
+class LitHallOptions(Ranged):
+    """Options of `make_lit_hall`; ``scale`` of the images' sides."""
+
+    ranges: ClassVar = {"scale": (0.01, 4), "seed": _SEEDS}
+
+    scale: float = option(1.0, "Scale of the sizes of the images.")
+    seed: int = option(1, _SEED)

@@ -9,6 +9,7 @@ from typing import Any
 from ptmtools.lazy import Lazy
 from ptmtools_samples.options import (
     AtriumOptions,
+    LitHallOptions,
     MuseumOptions,
     NoOptions,
     PhotoGalleryOptions,
@@ -74,6 +75,12 @@ SAMPLES: dict[str, Sample] = {
         "Rooms of the museum without windows, with paintings of many sizes and fine statues.",
         WebGalleryOptions,
         Lazy(f"{_HERE}.web_gallery:make_web_gallery"),
+    ),
+    "lit-hall": Sample(
+        "Three rooms with lamps, daylight, polish, metal and glass.",
+        "One GLB with the sun, spots, glowing panels, and metallic and roughness factors.",
+        LitHallOptions,
+        Lazy(f"{_HERE}.lit_hall:make_lit_hall"),
     ),
     "campus": Sample(
         "Buildings along a street, for `ptm campus`.",

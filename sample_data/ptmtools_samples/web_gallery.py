@@ -13,7 +13,6 @@ Positions of all meshes are rounded on one grid of half a millimetre, as `gltf-t
 from __future__ import annotations
 
 import io
-import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.glb import glb
 from ptmtools_samples.files import HEAD, File, Note, ignore
 from ptmtools_samples.furnishing import furnish, hang
+from ptmtools_samples.gltf import GlbBuffer
 from ptmtools_samples.mesh import Face, Thing
 from ptmtools_samples.museum import MATERIALS, surface_names
 from ptmtools_samples.noise import bytes_of, generator
@@ -42,7 +41,6 @@ SIDES, SURFACE_SIDE = (1400, 900, 1200, 1600, 1000), 1024
 QUALITY = 85
 #: Draco: bits of positions on one grid for all meshes, and of texture coordinates.
 POSITION_BITS, UV_BITS, SPEED = 16, 14, 3
-REPEAT, CLAMP, LINEAR, MIPMAPS = 10497, 33071, 9729, 9987
 
 
 @dataclass(frozen=True)
@@ -111,23 +109,8 @@ def surface(name: str, options: WebGalleryOptions) -> bytes:
     return jpeg(Image.fromarray(bytes_of(field)))
 
 
-class _Buffer:
-    """The binary chunk of a GLB and its views."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, int]] = []
-
-    def add(self, part: bytes) -> int:
-        """Index of the view."""
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(part)}
-        self.views.append(view)
-        self.data += part + bytes(-len(part) % 4)
-        return len(self.views) - 1
-
-
 def _primitive(
-    mesh: WebMesh, low: NDArray[np.float64], extent: float, buffer: _Buffer, accessors: list[Any]
+    mesh: WebMesh, low: NDArray[np.float64], extent: float, buffer: GlbBuffer
 ) -> dict[str, Any]:
     import DracoPy
 
@@ -150,8 +133,8 @@ def _primitive(
     }
     points = np.asarray(decoded.points)
     count = len(points)
-    first = len(accessors)
-    accessors += [
+    first = len(buffer.accessors)
+    buffer.accessors += [
         {
             "componentType": 5126,
             "count": count,
@@ -183,8 +166,7 @@ def _material(name: str, source: dict[str, int]) -> dict[str, Any]:
 def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> bytes:
     """A GLB with a node for each mesh; ``images`` by the name of the material, or of the texture
     that it uses (`ptmtools_samples.museum.MATERIALS`)."""
-    buffer = _Buffer()
-    accessors: list[dict[str, Any]] = []
+    buffer = GlbBuffer()
     every = np.concatenate([mesh.points for mesh in meshes]).astype(np.float64)
     low = every.min(axis=0)
     extent = float((every.max(axis=0) - low).max())
@@ -192,7 +174,7 @@ def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> b
     materials: list[dict[str, Any]] = []
     primitives = []
     for mesh in meshes:
-        primitive = _primitive(mesh, low, extent, buffer, accessors)
+        primitive = _primitive(mesh, low, extent, buffer)
         primitives.append({**primitive, "material": len(materials)})
         materials.append(_material(mesh.material, source))
     pictures = [
@@ -212,17 +194,9 @@ def glb_of(meshes: Sequence[WebMesh], images: dict[str, bytes], about: str) -> b
             {"source": k, "sampler": int(name.startswith("painting"))}
             for k, name in enumerate(images)
         ],
-        "samplers": [
-            {"wrapS": wrap, "wrapT": wrap, "magFilter": LINEAR, "minFilter": MIPMAPS}
-            for wrap in (REPEAT, CLAMP)
-        ],
         "images": pictures,
-        "accessors": accessors,
-        "bufferViews": buffer.views,
-        "buffers": [{"byteLength": len(buffer.data)}],
     }
-    text = json.dumps(document, separators=(",", ":")).encode()
-    return glb([(b"JSON", text), (b"BIN\0", bytes(buffer.data))])
+    return buffer.encode(document)
 
 
 def make_web_gallery(options: WebGalleryOptions, note: Note = ignore) -> Iterator[File]:
