@@ -13,7 +13,7 @@ and the hollows of the walls, of a museum of a thousand rooms.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,18 +21,19 @@ import numpy as np
 from ptmtools.arrays import Floats, normals, sum_by_group
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.doors import Doors
-from ptmtools.cells.floors import Floors, ceiling_height, detail_of
+from ptmtools.cells.fabric import Fabric
+from ptmtools.cells.floors import Floors, ceiling_height
 from ptmtools.cells.model import descend
 from ptmtools.cells.named_rooms import Contact, Volumes, contacts
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.places import Places, find_places, spread
 from ptmtools.cells.planar import counting
+from ptmtools.cells.planes import Polyhedron, bounds
 from ptmtools.cells.portals import find_portals
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.cells.split_planes import Reveals
 from ptmtools.cells.structure import (
     LOOKS,
-    Opaque,
     Structure,
     Surroundings,
     WallPlane,
@@ -43,6 +44,7 @@ from ptmtools.cells.structure import (
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import Portals
 from ptmtools.scene.model import Scene
+from ptmtools.scene.orientation.main_axes import main_axes
 from ptmtools.tolerance import Tolerance
 
 #: Points that represent the viewers, and the surfaces.
@@ -117,6 +119,8 @@ def _thin(points: Floats, weight: Floats) -> tuple[Floats, Floats]:
     return points[::step], weight[::step] * step
 
 
+#: Margin of the first root box around the model, as a share of the model's extent.
+BOX_MARGIN = 0.01
 #: Side of a patch of floor, in radii of a body.
 GRAIN = 0.5
 #: A model has rooms if this much of its places, m², is in them, and the number of samples.
@@ -128,47 +132,56 @@ class Building:
     """The structure of a scene, and the planes that may split it."""
 
     structure: Structure
+    wide: Polyhedron  # the first root box, along the main axes of the model and wider than it
+    tight: Floats  # (2, 3) the second one, around the walls
     walls: list[WallPlane]
     reveals: Reveals
     places: Places  # shut door leaves do not block, unless they act as walls
     doors: Doors
     ceiling: float | None  # `ceiling_height`
     options: SubdivideOptions
-    volumes: Volumes = field(default_factory=Volumes)
-    contacts: tuple[Contact, ...] = ()  # of the volumes
-    facets: int = 0  # planes of a scanned surface, which do not split
+    volumes: Volumes
+    contacts: tuple[Contact, ...]  # of the volumes
+    cameras: Floats  # (c, 3) where the model has cameras
+    furniture: tuple[str, ...]  # the objects with detail by shape, those with most of it first
+    shaped: int  # triangles of detail by shape
+    facets: int  # planes of a scanned surface, which do not split
 
     @staticmethod
     def from_scene(
         scene: Scene, options: SubdivideOptions, executor: Executor | None = None
     ) -> Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
-        opaque = Opaque.from_scene(scene, options)
-        structure = Structure.from_opaque(opaque, tolerance)
-        doors, structure = Doors.recognise(scene, opaque, structure, options)
+        fabric = Fabric.from_scene(scene, options)
+        doors, structure = Doors.recognise(fabric, Structure.from_fabric(fabric, tolerance))
         every = find_walls(structure, options.wall_area)
         walls = every if options.structural else without_facets(every)
-        reveals = Reveals(structure, options.wall_thickness)
         walker = Walker(*options.walker)
-        detail = detail_of(scene, structure, options)
-        floors = Floors.from_scene(scene, detail, GRAIN * walker.radius)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
+        floors = Floors.from_fabric(fabric, GRAIN * walker.radius)
         places = find_places(floors, solid, walker, tolerance, executor)
         ceiling = None
         if options.ceiling == "auto":
             ceiling = ceiling_height(structure, walls, walker, options.wall_area)
         volumes = Volumes.from_scene(scene, options)
-        touching = contacts(volumes.rooms, options, tolerance)
+        wide, tight = _root_boxes(fabric, structure)
+        shaped = fabric.source[fabric.shaped]
+        owners, size = np.unique(scene.triangle_object[shaped], return_counts=True)
         return Building(
             structure=structure,
+            wide=wide,
+            tight=tight,
             walls=walls,
-            reveals=reveals,
+            reveals=Reveals(structure, options.wall_thickness),
             places=places,
             doors=doors,
             ceiling=ceiling,
             options=options,
             volumes=volumes,
-            contacts=touching,
+            contacts=contacts(volumes.rooms, options, tolerance),
+            cameras=np.array([camera.position for camera in scene.cameras]).reshape(-1, 3),
+            furniture=tuple(scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]),
+            shaped=len(shaped),
             facets=len(every) - len(walls),
         )
 
@@ -206,3 +219,15 @@ class Building:
         structure = self.structure
         walls = np.concatenate([structure.corners, self.doors.glass])
         return Surroundings(walls, structure.tolerance)
+
+
+def _root_boxes(fabric: Fabric, structure: Structure) -> tuple[Polyhedron, Floats]:
+    """`Building.wide` and `Building.tight`; the latter has a height in every direction: a mere
+    floor still has one cell above it."""
+    corners, tolerance = fabric.scene.corners, structure.tolerance
+    axes, margin = main_axes(corners), BOX_MARGIN * tolerance.extent
+    low, high = bounds(corners @ axes.T)
+    wide = Polyhedron.box(low - margin, high + margin)
+    low, high = bounds(structure.corners if len(structure.corners) else corners)
+    tight = np.array([low, np.where(high - low < tolerance.thin, low + margin, high)])
+    return replace(wide, points=wide.points @ axes), tight

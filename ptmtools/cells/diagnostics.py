@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats
+from ptmtools.cells.building import Building
 from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import DoorState
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.roles import is_door_name, triangles_named
-from ptmtools.cells.space import Unreached, UnreachedRoom
+from ptmtools.cells.space import DividedSpace, UnreachedRoom
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.quantities import count
-from ptmtools.scene.model import Scene
 
 #: Number of objects, or places, that a note names.
 NAMED = 3
@@ -31,27 +30,21 @@ NO_PLACES = Warned(
 )
 
 
-def detail_notes(scene: Scene, detail: Ints) -> list[str]:
-    """The note on (d,) triangles that count as detail because of their shape."""
-    if not len(detail):
-        return []
-    owners, size = np.unique(scene.triangle_object[detail], return_counts=True)
-    names = _list([scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]])
-    return [
-        f"{len(detail):,} triangles of {count(len(owners), 'object')} ({names}) are small, dense "
-        "and round and count as detail, which neither divides nor hides; --structural NAME or "
-        "--no-detail-by-shape changes that"
-    ]
-
-
-def facet_notes(facets: int) -> list[str]:
-    """The note on planes of a scanned surface."""
-    if not facets:
-        return []
-    return [
-        f"{facets:,} flat pieces lean in all directions, like a scan or terrain, and do not divide "
-        "space; --structural NAME makes objects do so"
-    ]
+def building_notes(building: Building) -> Iterator[str]:
+    """Notes on detail by shape, on volumes of rooms and on the planes of a scanned surface."""
+    if building.furniture:
+        objects = count(len(building.furniture), "object")
+        yield (
+            f"{building.shaped:,} triangles of {objects} ({_list(building.furniture)}) are small, "
+            "dense and round and count as detail, which neither divides nor hides; --structural "
+            "NAME or --no-detail-by-shape changes that"
+        )
+    yield from building.volumes.notes
+    if building.facets:
+        yield (
+            f"{building.facets:,} flat pieces lean in all directions, like a scan or terrain, and "
+            "do not divide space; --structural NAME makes objects do so"
+        )
 
 
 #: The state of a door leaf that visitors pass, as a note describes it.
@@ -62,7 +55,25 @@ _OPEN: dict[DoorState, str] = {
 }
 
 
-def door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list[str]:
+def space_notes(building: Building, space: DividedSpace) -> list[str]:
+    """Notes on doors, and on space that cannot be reached.
+
+    Raises
+    ------
+    InputError: PTM-I305 if more than `MUCH` is left out under ``strict``.
+    """
+    notes, options = [], building.options
+    if options.doors != "closed":
+        notes = _door_notes(building.doors.leaves, space.doors, options.doors)
+        if building.doors.unrecognised and (space.beyond.rooms or space.beyond.outside):
+            notes.append(
+                "named like a door but treated as a wall, because of its size or of no space on "
+                f"both sides: {_list(building.doors.unrecognised)}; --door NAME makes it a door"
+            )
+    return notes + _unreached_notes(space, options.reach == "all", options.strict)
+
+
+def _door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list[str]:
     """Notes on door leaves; visitors pass those ``opened``, (d,)."""
     notes = []
     for which, state in (
@@ -87,29 +98,9 @@ def viewpoint_notes(solid: Floats) -> list[str]:
     ]
 
 
-def unrecognised_door_notes(scene: Scene, leaves: list[DoorLeaf]) -> list[str]:
-    """The note, where space is unreachable, on objects and materials that have a door's name, but
-    no triangle in a door leaf."""
-    named = triangles_named(scene, is_door_name)
-    taken = np.concatenate([np.zeros(0, dtype=np.int64), *(leaf.triangles for leaf in leaves)])
-    walls = np.setdiff1d(scene.triangle_object[named], scene.triangle_object[taken])
-    if not len(walls):
-        return []
-    return [
-        "named like a door but treated as a wall, because of its size or of no space on both "
-        f"sides: {_list([scene.objects[i] for i in walls])}; --door NAME makes it a door"
-    ]
-
-
-def unreached_notes(unreached: Unreached, kept: bool, place: float, strict: bool) -> list[str]:
-    """Notes on unreachable rooms, ``kept`` or left out; ``place``: m² of walkable floor in the
-    cells.
-
-    Raises
-    ------
-    InputError: PTM-I305 if more than `MUCH` is left out under ``strict``.
-    """
-    rooms, outside = unreached.rooms, unreached.outside
+def _unreached_notes(space: DividedSpace, kept: bool, strict: bool) -> list[str]:
+    """Notes on unreachable rooms, ``kept`` or left out."""
+    rooms, outside, place = space.beyond.rooms, space.beyond.outside, space.place
     fate = "cannot be reached from the viewpoint and is left out"
     if kept:
         fate = "cannot be reached from the viewpoint and is kept as a room"
@@ -161,11 +152,10 @@ def leaf_notes(cells: Cells, reached: Bools) -> list[str]:
     return notes
 
 
-def triangle_notes(scene: Scene, pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
+def triangle_notes(pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
     """The note on triangles without a piece in any cell."""
-    nowhere = np.ones(len(scene.triangles), dtype=bool)
-    nowhere[pieces.source[np.any(owner >= 0, axis=1)]] = False
-    lost = int(np.count_nonzero(nowhere))
+    owned = pieces.source[np.any(owner >= 0, axis=1)]
+    lost = len(np.unique(pieces.source)) - len(np.unique(owned))
     return [f"{lost} triangles lie outside all cells and are never visible"] * (lost > 0)
 
 
@@ -186,7 +176,7 @@ def undecided_notes(undecided: Mapping[str, int]) -> list[str]:
     return notes
 
 
-def _list(names: list[str]) -> str:
+def _list(names: Sequence[str]) -> str:
     """The first `NAMED` names."""
     return ", ".join([*names[:NAMED], *["…"] * (len(names) > NAMED)])
 

@@ -24,18 +24,24 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.doorways import _GRID, RELIEF, Slabs, close_openings, free_on_both_sides
-from ptmtools.cells.facets import Facets, Welded
-from ptmtools.cells.floors import ROOFED, Floors, detail_of, roofed_share
+from ptmtools.cells.fabric import (
+    Fabric,
+    Welded,
+    connected_pieces,
+    facets_of,
+    is_door_name,
+    triangles_named,
+)
+from ptmtools.cells.floors import ROOFED, Floors, roofed_share
 from ptmtools.cells.model import descend
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.places import spread
 from ptmtools.cells.planar import Geometry
 from ptmtools.cells.planes import bounds
 from ptmtools.cells.portals import Portal, find_portals, flood
-from ptmtools.cells.roles import Designated, connected_pieces, is_door_name, triangles_named
 from ptmtools.cells.search import Nearby, connect, distinct
 from ptmtools.cells.split_planes import DoorPlanes
-from ptmtools.cells.structure import Opaque, Structure, Surroundings, spread_over
+from ptmtools.cells.structure import Structure, Surroundings, spread_over
 from ptmtools.scene.model import Scene
 
 #: A leaf is thinner than this, metres,
@@ -77,13 +83,10 @@ class DoorLeaf:
         return front, back
 
 
-def find_doors(
-    scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
-) -> list[DoorLeaf]:
+def find_doors(fabric: Fabric, structure: Structure) -> list[DoorLeaf]:
     """The door leaves of a scene, in the order of their first triangles in the file."""
-    roles = Designated.from_options(scene, options)
-    is_door = roles.door
-    free = is_door | ~(roles.structural | roles.detail)
+    scene, is_door = fabric.scene, fabric.door
+    free = is_door | ~(fabric.structural | fabric.detail)
     named = triangles_named(scene, is_door_name) & free
     slack = structure.tolerance.plane
     designated = _pieces(scene, np.flatnonzero(is_door))
@@ -91,11 +94,11 @@ def find_doors(
     leaf = _leaf_of_slab(by_name, slack)
     by_name = by_name.only(free_on_both_sides(by_name.merge(leaf), structure)[leaf])
     flat = _flat(scene, structure, np.flatnonzero((free & ~is_door)[structure.source]))
-    by_shape = _closing(flat, structure, options)
+    by_shape = _closing(flat, structure, fabric.options.wall_thickness)
     slabs = designated.append(by_name).append(by_shape)
     leaf = _leaf_of_slab(slabs, slack)
     slab_named = np.bincount(leaf, np.arange(len(slabs)) < len(designated) + len(by_name)) > 0
-    leaves = _leaves(scene, slabs.merge(leaf), slab_named, free, is_door | named, opaque, slack)
+    leaves = _leaves(fabric, slabs.merge(leaf), slab_named, free, is_door | named, slack)
     return sorted(leaves, key=lambda leaf: int(leaf.triangles[0]))
 
 
@@ -125,14 +128,10 @@ def _pieces(scene: Scene, triangles: Ints) -> Slabs:
 def _named_slabs(scene: Scene, triangles: Ints, slack: float) -> Slabs:
     """The pieces and the rectangles of these triangles that have the size of a door. A piece with
     several rectangles of that size is no leaf, unless they are the two faces of one slab."""
-    mesh = Welded.from_triangles(scene.points, scene.triangles[triangles])
-    owner = scene.triangle_object[triangles[mesh.source]]
-    piece = _cross(connected_pieces(mesh), owner)
-    region = _cross(Facets.from_mesh(mesh, scene.tolerance).region, owner)
-    pieces, flat = (
-        Slabs.from_triangles(mesh.corners, piece),
-        Slabs.from_triangles(mesh.corners, region),
-    )
+    facets, source = facets_of(scene, triangles)
+    corners, owner = facets.mesh.corners, scene.triangle_object[source]
+    piece, region = (_cross(part, owner) for part in (connected_pieces(facets.mesh), facets.region))
+    pieces, flat = (Slabs.from_triangles(corners, group) for group in (piece, region))
     whole = np.zeros(len(flat), dtype=np.int64)
     whole[region] = piece
     fits = _door_sized(flat, slack)
@@ -167,7 +166,7 @@ def _cross(*names: NDArray[np.integer]) -> Ints:
     return result
 
 
-def _closing(slabs: Slabs, structure: Structure, options: SubdivideOptions) -> Slabs:
+def _closing(slabs: Slabs, structure: Structure, wall_thickness: float) -> Slabs:
     """The slabs that close an opening in a wall, alone or as a pair."""
     if not len(slabs):
         return slabs
@@ -182,7 +181,7 @@ def _closing(slabs: Slabs, structure: Structure, options: SubdivideOptions) -> S
     first, second = first[paired], second[paired]
     door = connect(len(leaves), np.stack([first, second], axis=1))
     door = np.unique(door, return_inverse=True)[1].reshape(-1)
-    closes = close_openings(leaves.merge(door), structure, options.wall_thickness)
+    closes = close_openings(leaves.merge(door), structure, wall_thickness)
     return slabs.only((closes[door] & fits)[leaf])
 
 
@@ -199,13 +198,7 @@ def _leaf_of_slab(slabs: Slabs, slack: float) -> Ints:
 
 
 def _leaves(
-    scene: Scene,
-    slabs: Slabs,
-    slab_named: Bools,
-    free: Bools,
-    named: Bools,
-    opaque: Opaque,
-    slack: float,
+    fabric: Fabric, slabs: Slabs, slab_named: Bools, free: Bools, named: Bools, slack: float
 ) -> Iterator[DoorLeaf]:
     """The leaves that fill slabs, from those triangles of the scene that are ``free``, (T,).
 
@@ -215,10 +208,11 @@ def _leaves(
     """
     if not len(slabs):
         return
-    corners, source = scene.corners, opaque.source
+    scene, source = fabric.scene, fabric.source
+    corners = scene.corners
     region = np.zeros(len(corners), dtype=np.int64)
     owner = scene.triangle_object[source], scene.triangle_material[source]
-    region[source] = 1 + _cross(opaque.facets.region, *owner)
+    region[source] = 1 + _cross(fabric.facets.region, *owner)
     size = np.bincount(region)
     nearby = Nearby(corners, slack)
     reach = np.array([RELIEF, slack, slack])
@@ -270,24 +264,26 @@ class Doors:
     glass: Floats  # (n, 3, 3) transparent triangles, metres
     roofed: bool  # whether the building has roofs or ceilings
     planes: DoorPlanes
+    unrecognised: tuple[str, ...]  # objects with a door's name or material, none in a leaf
 
     @staticmethod
-    def recognise(
-        scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
-    ) -> tuple[Doors, Structure]:
+    def recognise(fabric: Fabric, structure: Structure) -> tuple[Doors, Structure]:
         """The doors of a scene, and its structure with their triangles unsimplified."""
-        leaves = find_doors(scene, opaque, structure, options)
+        leaves, scene = find_doors(fabric, structure), fabric.scene
         leaf = np.full(len(scene.triangles), -1)
         for i, door in enumerate(leaves):
             leaf[door.triangles] = i
         glass, roofed = scene.corners[~scene.opaque], True
         if leaves:
-            structure = Structure.from_opaque(opaque, structure.tolerance, leaf >= 0)
-            roofed = roofed_share(structure.corners, options.wall_area) >= ROOFED
+            structure = Structure.from_fabric(fabric, structure.tolerance, leaf >= 0)
+            roofed = roofed_share(structure.corners, fabric.options.wall_area) >= ROOFED
         leaf_of_triangle = leaf[structure.source]
         across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
         planes = DoorPlanes.from_structure(structure, leaf_of_triangle, across)
-        return Doors(leaves, leaf_of_triangle, glass, roofed, planes), structure
+        named = np.unique(scene.triangle_object[triangles_named(scene, is_door_name)])
+        walls = np.setdiff1d(named, scene.triangle_object[leaf >= 0])
+        unrecognised = tuple(scene.objects[i] for i in walls)
+        return Doors(leaves, leaf_of_triangle, glass, roofed, planes, unrecognised), structure
 
     def triangles(self, which: Bools) -> NDArray[np.int32]:
         """The triangles of the scene, ascending, of the leaves ``which``, (d,)."""
@@ -447,14 +443,12 @@ def enclosure(scene: Scene, options: SubdivideOptions | None = None) -> Enclosur
     """How enclosed a scene is, its door leaves shut."""
     options = options or SubdivideOptions()
     tolerance = scene.tolerance.for_walls(options.wall_thickness)
-    opaque = Opaque.from_scene(scene, options)
-    doors, structure = Doors.recognise(
-        scene, opaque, Structure.from_opaque(opaque, tolerance), options
-    )
+    fabric = Fabric.from_scene(scene, options)
+    doors, structure = Doors.recognise(fabric, Structure.from_fabric(fabric, tolerance))
     corners, names = structure.corners, tuple(leaf.name for leaf in doors.leaves)
     if not len(corners):
         return Enclosure(names, 0.0, 0, 0.0)
-    floors = Floors.from_scene(scene, detail_of(scene, structure, options))
+    floors = Floors.from_fabric(fabric)
     around = Surroundings(corners, tolerance)
     points, _ = spread(floors.corners)
     points = spread_over(points, 4 * _POINTS) + [0.0, _EYE, 0.0]

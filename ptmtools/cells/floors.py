@@ -25,15 +25,13 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges, sum_by_group
-from ptmtools.cells.facets import Facets, Welded
-from ptmtools.cells.options import SubdivideOptions, Walker
+from ptmtools.cells.fabric import Fabric, facets_of
+from ptmtools.cells.options import Walker
 from ptmtools.cells.planar import Geometry, unite_rows
 from ptmtools.cells.planes import PLAN, PlaneFrame, Polyhedron, bounds, section
 from ptmtools.cells.portals import FLOOR_COSINE, plumb
-from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import distinct
 from ptmtools.cells.structure import Structure, WallPlane
-from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance, rank
 
 #: Number of small regions from which a floor is a scan.
@@ -51,16 +49,15 @@ class Floors:
     patch: Bools  # (r,) whether it is one
 
     @staticmethod
-    def from_scene(scene: Scene, detail: Bools, grain: float = 0.0) -> Floors:
-        """The floors of a scene but for its ``detail``, (T,); ``grain``: side of a patch, metres,
-        none for 0."""
+    def from_fabric(fabric: Fabric, grain: float = 0.0) -> Floors:
+        """``grain``: side of a patch, metres, none for 0."""
+        scene = fabric.scene
         normal = normals(scene.corners)
         steep = np.abs(normal[:, 1]) <= FLOOR_COSINE * np.linalg.norm(normal, axis=1)
-        level = np.flatnonzero(~(steep | detail))
-        mesh = Welded.from_triangles(scene.points, scene.triangles[level])
-        facets = Facets.from_mesh(mesh, scene.tolerance)
-        corners, source = facets.reduce(np.ones(len(mesh.source), dtype=bool), scene.tolerance)
-        above = (scene.two_sided | (normal[:, 1] > 0))[level[mesh.source]]
+        level = np.flatnonzero(~(steep | fabric.find_detail()))
+        facets, level = facets_of(scene, level)
+        corners, source = facets.reduce(np.ones(len(level), dtype=bool), scene.tolerance)
+        above = (scene.two_sided | (normal[:, 1] > 0))[level]
         above = np.bincount(facets.region, above, len(facets.area)) > 0
         region, front = facets.region[source], above[facets.region[source]]
         patch = _small(corners, region, grain) if grain else np.zeros(len(region), dtype=bool)
@@ -124,19 +121,6 @@ def _slopes(corners: Floats, region: Ints, patch: Bools) -> Floats:
     top = np.full(len(patch), -np.inf)
     np.maximum.at(top, region, rise.max(axis=1))
     return np.column_stack([slope, np.where(patch, top, level)])
-
-
-def detail_of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles are detail, including glass."""
-    roles = Designated.from_options(scene, options)
-    detail = roles.detail.copy()
-    detail[structure.detail] = True
-    glass = np.flatnonzero(~(scene.opaque | detail | roles.structural))
-    if options.detail_by_shape and len(glass):
-        mesh = Welded.from_triangles(scene.points, scene.triangles[glass])
-        source, facets = glass[mesh.source], Facets.from_mesh(mesh, scene.tolerance)
-        detail[source] = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
-    return detail
 
 
 #: The largest floor triangles, this many, represent the whole floor.

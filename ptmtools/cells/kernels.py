@@ -1,4 +1,4 @@
-"""Compiled loops: growth of flat regions over a mesh (`facets`), connected indices (`search`),
+"""Compiled loops: growth of flat regions over a mesh (`fabric`), connected indices (`search`),
 descent of whole triangles through a BSP tree (`ownership`), points above floors (`model`).
 """
 

@@ -15,18 +15,16 @@ opposite directions in the two is ignored.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
-from ptmtools.cells.facets import Facets, Welded
+from ptmtools.cells.fabric import Fabric, Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
 from ptmtools.cells.planes import PlaneFrame, planes_of
-from ptmtools.cells.roles import Designated, detail_by_shape
 from ptmtools.cells.search import Bins, Nearby, Tries, connect
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
@@ -56,17 +54,16 @@ class Structure:
     nearby: Nearby
     bins: Bins
     tolerance: Tolerance
-    detail: Ints  # (d,) triangles of the scene that are detail by shape
     source: Ints  # (T,) the triangle of the scene that each is, or the first of its region
     door: Bools  # (T,) whether it belongs to a door leaf, which is no wall but may block
 
     @staticmethod
-    def from_opaque(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
+    def from_fabric(fabric: Fabric, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
         """The structure of the opaque triangles, in the order of the file, flat regions of many in
-        as few as their outlines need (`facets`); ``doors``: (T,) whether one of the scene's
-        triangles belongs to a door leaf."""
-        facets, source, detail, forced, file = opaque
-        mesh = facets.mesh
+        as few as their outlines need; ``doors``: (T,) whether one of the scene's triangles belongs
+        to a door leaf."""
+        facets, source, detail = fabric.facets, fabric.source, fabric.shaped
+        mesh, forced, file = facets.mesh, fabric.forced[source], fabric.scene.tolerance
         door = np.zeros(len(source), dtype=bool) if doors is None else doors[source]
         leaf, rest = np.flatnonzero(door & ~detail), np.flatnonzero(~door)
         if len(rest) < len(door):  # the edge of a leaf must not split the jamb that it touches
@@ -89,7 +86,6 @@ class Structure:
             nearby=Nearby(corners, tolerance.rounding),
             bins=Bins(planes, tolerance),
             tolerance=tolerance,
-            detail=source[detail],
             source=source[first[order]],
             door=door[first[order]],
         )
@@ -111,35 +107,12 @@ def structural_triangles(
     """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and no door
     leaves that are ``opened`` (see `Cells.opened`), unless these hide. The first of equal triangles
     may stand for all."""
-    opaque = Opaque.from_scene(scene, options)
+    fabric = Fabric.from_scene(scene, options)
     result = np.zeros(len(scene.triangles), dtype=bool)
-    result[opaque.source[~opaque.detail]] = True
+    result[fabric.source[~fabric.shaped]] = True
     if opened is not None and options.doors != "pass":
         result[opened] = False
     return result
-
-
-class Opaque(NamedTuple):
-    """The opaque triangles of a scene that are not detail by name or class."""
-
-    facets: Facets
-    source: Ints  # (n,) the triangles of the scene in the mesh, ascending
-    detail: Bools  # (n,) whether each is detail by shape
-    forced: Bools  # (n,) whether `SubdivideOptions.structural` names it
-    tolerance: Tolerance  # the scene's
-
-    @staticmethod
-    def from_scene(scene: Scene, options: SubdivideOptions) -> Opaque:
-        roles = Designated.from_options(scene, options)
-        candidates = np.flatnonzero(scene.opaque & ~roles.detail)
-        mesh = Welded.from_triangles(scene.points, scene.triangles[candidates])
-        source = candidates[mesh.source]
-        facets = Facets.from_mesh(mesh, scene.tolerance)
-        detail = np.zeros(len(source), dtype=bool)
-        if options.detail_by_shape:
-            detail = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
-            detail &= ~roles.structural[source]
-        return Opaque(facets, source, detail, roles.forced[source], scene.tolerance)
 
 
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:

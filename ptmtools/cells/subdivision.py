@@ -21,17 +21,15 @@ from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.cells.building import Building
 from ptmtools.cells.diagnostics import (
     NO_PLACES,
-    detail_notes,
-    door_notes,
-    facet_notes,
+    building_notes,
     leaf_notes,
+    space_notes,
     triangle_notes,
     undecided_notes,
-    unreached_notes,
-    unrecognised_door_notes,
     viewpoint_notes,
 )
 from ptmtools.cells.doors import THICK
+from ptmtools.cells.fabric import matches
 from ptmtools.cells.floors import ROOFED, roofed_share
 from ptmtools.cells.joining import join_pieces
 from ptmtools.cells.model import OUTSIDE, Cells, descend
@@ -40,22 +38,18 @@ from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.places import eye_region, meets
 from ptmtools.cells.planar import count, counting
 from ptmtools.cells.planes import Polyhedron, bounds, boxes_meet
-from ptmtools.cells.roles import matches
 from ptmtools.cells.rooms import group_cells
 from ptmtools.cells.sight import seen_from_places
 from ptmtools.cells.space import DividedSpace, divide, divide_inside
-from ptmtools.cells.structure import LOOKS, Structure, Surroundings, spread_over
+from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import MOST_PORTALS
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
-from ptmtools.scene.orientation.main_axes import main_axes
 from ptmtools.tolerance import Tolerance
 
-#: Margin of the first root box around the model, as a share of the model's extent.
-BOX_MARGIN = 0.01
 #: Number of triangles that take as long to subdivide as two processes take to start.
 LARGE = 4000
 
@@ -81,21 +75,21 @@ def subdivide(
     _check(scene, options)
     with counting() as undecided:
         building = Building.from_scene(scene, options, executor)
-        space, notes = _divide_scene(scene, building, progress, executor)
+        space, notes = _divide_building(
+            building, progress, executor, large=len(scene.triangles) >= LARGE
+        )
         cells = _cut_and_group(scene, building, space, notes, executor)
     check_seen(scene, cells)
     return replace(cells, notes=(*cells.notes, *undecided_notes(undecided)))
 
 
-def _divide_scene(
-    scene: Scene, building: Building, progress: Progress, executor: Executor
+def _divide_building(
+    building: Building, progress: Progress, executor: Executor, *, large: bool
 ) -> tuple[DividedSpace, list[str]]:
-    """The divided space of a scene, the first root box if that is closed, else the second; and
-    notes on it."""
-    wide, tight = _root_boxes(scene, building.structure)
-    notes = [*detail_notes(scene, building.structure.detail), *building.volumes.notes]
-    notes += facet_notes(building.facets)
-    clipped = executor.submit(divide_inside, building, tight, long=len(scene.triangles) >= LARGE)
+    """The divided space of a building, the first root box if that is closed, else the second; and
+    notes on it. ``large``: whether the division takes long."""
+    wide, tight, notes = building.wide, building.tight, [*building_notes(building)]
+    clipped = executor.submit(divide_inside, building, tight, long=large)
     try:
         space = divide(building, wide, progress)
         if not space.closed:
@@ -110,7 +104,7 @@ def _divide_scene(
         fewer = replace(building, options=replace(building.options, max_leaves=limit))
         again = divide(fewer, wide) if space.closed else space
         space = again if again.closed else replace(divide_inside(fewer, tight), closed=False)
-    notes += _space_notes(scene, building, space)
+    notes += space_notes(building, space)
     if space.tree.unsplit:
         notes.append(_limit_note(space.tree.unsplit, limit, many))
     if space.tree.ended:
@@ -120,29 +114,6 @@ def _divide_scene(
             "(--gain changes that)"
         )
     return space, notes
-
-
-def _root_boxes(scene: Scene, structure: Structure) -> tuple[Polyhedron, Floats]:
-    """A box along the main axes of a scene, wider than it, and (2, 3) the box around its walls,
-    which has a height in every direction: a mere floor still has one cell above it."""
-    axes, tolerance = main_axes(scene.corners), structure.tolerance
-    low, high = bounds(scene.corners @ axes.T)
-    margin = BOX_MARGIN * tolerance.extent
-    wide = Polyhedron.box(low - margin, high + margin)
-    low, high = bounds(structure.corners if len(structure.corners) else scene.corners)
-    tight = np.array([low, np.where(high - low < tolerance.thin, low + margin, high)])
-    return replace(wide, points=wide.points @ axes), tight
-
-
-def _space_notes(scene: Scene, building: Building, space: DividedSpace) -> list[str]:
-    """Notes on doors, and on space that cannot be reached."""
-    options, notes = building.options, []
-    if options.doors != "closed":
-        notes += door_notes(building.doors.leaves, space.doors, options.doors)
-        if space.beyond.rooms or space.beyond.outside:
-            notes += unrecognised_door_notes(scene, building.doors.leaves)
-    notes += unreached_notes(space.beyond, options.reach == "all", space.place, options.strict)
-    return notes
 
 
 def _limit_note(unsplit: int, limit: int, many: bool) -> str:
@@ -166,7 +137,7 @@ def _cut_and_group(
     cells = assemble_cells(scene, building, space, pieces, owner, notes)
     name = np.append(compact_numbers(seen_from_places(cells, executor)), np.int32(-1))
     cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
-    dropped = [*leaf_notes(cells, space.reached), *triangle_notes(scene, pieces, name[owner])]
+    dropped = [*leaf_notes(cells, space.reached), *triangle_notes(pieces, name[owner])]
     cells = group_cells(replace(cells, notes=(*cells.notes, *dropped)), options, building.volumes)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
     if options.doors == "hidden":
@@ -232,7 +203,7 @@ def assemble_cells(
     portals = sorted(portals, key=lambda portal: portal.passage)
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     passage = np.array([portal.passage for portal in portals], dtype=np.bool_)
-    standing, eye_floor, standing_notes = _viewers(scene, building, space, bodies, rename)
+    standing, eye_floor, standing_notes = _viewers(building, space, bodies, rename)
     # The inside of a door leaf is no place.
     standing &= ~_in_door_leaves(bodies, rename[ends[passage]], building.structure.tolerance)
     owned = np.any(owner >= 0, axis=1)
@@ -281,11 +252,7 @@ def _rename_children(children: NDArray[np.int32], rename: NDArray[np.int32]) -> 
 
 
 def _viewers(
-    scene: Scene,
-    building: Building,
-    space: DividedSpace,
-    bodies: list[Polyhedron],
-    rename: NDArray[np.int32],
+    building: Building, space: DividedSpace, bodies: list[Polyhedron], rename: NDArray[np.int32]
 ) -> tuple[Bools, Floats, list[str]]:
     """(L,) which leaves stand, `Cells.eye_floor`, and notes; ``rename``: the new number of each
     leaf of the tree."""
@@ -294,14 +261,11 @@ def _viewers(
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]
         notes.append(NO_PLACES)
-    viewpoints, cameras = (
-        np.array(points, dtype=np.float64).reshape(-1, 3)
-        for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
-    )
+    viewpoints = np.array(building.options.viewpoints, dtype=np.float64).reshape(-1, 3)
     leaf = _leaf_at(space, rename, viewpoints)
     notes += viewpoint_notes(_find_buried(building, viewpoints, eye_floor))
     # Viewers stand at requested viewpoints, whatever the floor there.
-    leaf = np.append(leaf, _leaf_at(space, rename, cameras))
+    leaf = np.append(leaf, _leaf_at(space, rename, building.cameras))
     standing[leaf[leaf >= 0]] = True
     return standing, eye_floor, notes
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.roles import matches
+from ptmtools.cells.fabric import matches
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import LimitError
 from ptmtools.executor import Executor

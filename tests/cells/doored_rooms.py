@@ -12,8 +12,9 @@ import numpy as np
 
 from ptmtools.cells import Cells, SubdivideOptions
 from ptmtools.cells.doors import Doors
+from ptmtools.cells.fabric import Fabric
 from ptmtools.cells.search import connect
-from ptmtools.cells.structure import Opaque, Structure
+from ptmtools.cells.structure import Structure
 from ptmtools.scene.model import Scene
 from ptmtools.visibility import compute_pvs
 from tests.cells.conftest import box, panel
@@ -92,8 +93,8 @@ def leaf_names(scene: Scene, **options: object) -> list[str]:
     """The names of the door leaves of a scene."""
     chosen = SubdivideOptions(**options)  # type: ignore[arg-type]
     tolerance = scene.tolerance.for_walls(chosen.wall_thickness)
-    opaque = Opaque.from_scene(scene, chosen)
-    doors, _ = Doors.recognise(scene, opaque, Structure.from_opaque(opaque, tolerance), chosen)
+    fabric = Fabric.from_scene(scene, chosen)
+    doors, _ = Doors.recognise(fabric, Structure.from_fabric(fabric, tolerance))
     return [door.name for door in doors.leaves]
 
 

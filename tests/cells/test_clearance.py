@@ -9,10 +9,11 @@ import shapely
 
 from ptmtools.arrays import Floats
 from ptmtools.cells import SubdivideOptions, places
-from ptmtools.cells.floors import Floors, detail_of
+from ptmtools.cells.fabric import Fabric
+from ptmtools.cells.floors import Floors
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import eye_region, find_places
-from ptmtools.cells.structure import Opaque, Structure
+from ptmtools.cells.structure import Structure
 from ptmtools.tolerance import Tolerance
 from tests.cells.conftest import box
 from tests.conftest import scene_of, subdivided
@@ -46,8 +47,9 @@ def areas_of(faces: Floats, walker: Walker = WALKER, times: int = 1) -> tuple[fl
     """m² in plan where one can stand, and where eyes can be, each floor by itself."""
     scene = subdivided(scene_of(faces.tolist()), times)
     options = SubdivideOptions(detail_by_shape=False)
-    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
-    floors = Floors.from_scene(scene, detail_of(scene, structure, options))
+    fabric = Fabric.from_scene(scene, options)
+    structure = Structure.from_fabric(fabric, scene.tolerance)
+    floors = Floors.from_fabric(fabric)
     places = find_places(floors, structure.corners, walker, scene.tolerance)
     eyes = eye_region(places, walker, structure.tolerance)
     return float(shapely.area(places.plan).sum()), float(shapely.area(shapely.union_all(eyes.plan)))

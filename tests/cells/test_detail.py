@@ -9,8 +9,8 @@ import pytest
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.floors import Floors, detail_of
-from ptmtools.cells.structure import Opaque, Structure
+from ptmtools.cells.fabric import Fabric
+from ptmtools.cells.floors import Floors
 from ptmtools.scene.model import Material, Scene
 from tests.conftest import scene_of, subdivided
 
@@ -105,6 +105,6 @@ def test_nobody_stands_on_a_ball_of_glass(room_faces) -> None:
     scene = replace(scene, materials=(*scene.materials, glass), triangle_material=of)
     for by_shape in (True, False):
         options = SubdivideOptions(detail_by_shape=by_shape)
-        structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
-        floors = Floors.from_scene(scene, detail_of(scene, structure, options))
+        fabric = Fabric.from_scene(scene, options)
+        floors = Floors.from_fabric(fabric)
         assert (len(floors.corners) > 4) != by_shape  # floor and ceiling have four

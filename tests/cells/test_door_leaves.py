@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import SubdivideOptions, subdivide
-from ptmtools.cells.roles import is_door_name
+from ptmtools.cells.fabric import is_door_name
 from ptmtools.errors import InputError
 from tests.cells.conftest import box, panel
 from tests.cells.doored_rooms import (

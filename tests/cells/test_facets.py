@@ -10,9 +10,9 @@ import shapely
 
 from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide
-from ptmtools.cells.facets import Facets, Welded
+from ptmtools.cells.fabric import Fabric, Facets, Welded
 from ptmtools.cells.planar import counting
-from ptmtools.cells.structure import Opaque, Structure, find_walls
+from ptmtools.cells.structure import Structure, find_walls
 from ptmtools.scene import ingest
 from ptmtools.tolerance import Tolerance
 from tests.conftest import scene_of, subdivided
@@ -109,8 +109,8 @@ def test_a_compressed_model_whose_outlines_cross_has_its_walls(shared: Path) -> 
     """At 14 bits, corners of furniture come to lie beyond the edges beside them."""
     scene = ingest(shared / "scenes/apartment_gallery/gallery.glb")
     with counting() as undecided:
-        structure = Structure.from_opaque(
-            Opaque.from_scene(scene, SubdivideOptions()), scene.tolerance
+        structure = Structure.from_fabric(
+            Fabric.from_scene(scene, SubdivideOptions()), scene.tolerance
         )
     assert undecided["triangles"] > 0
     opaque = scene.corners[scene.opaque]
@@ -150,7 +150,7 @@ def test_structural_names_hold_for_their_own_triangles_alone(quads) -> None:
     faces = np.concatenate(halves)
     scene = scene_of(faces, objects=["a"] * 128 + ["b"] * 128)
     options = SubdivideOptions(structural=("b",))
-    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
+    structure = Structure.from_fabric(Fabric.from_scene(scene, options), scene.tolerance)
     assert len(structure.corners) == 4
     right = structure.corners.reshape(4, 9)[:, ::3].mean(axis=1) > 5
     assert np.array_equal(structure.forced, right)
@@ -173,7 +173,7 @@ def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
         Structure, "lie_in", lambda *arguments: tried.append(1) or lie_in(*arguments)
     )
     walls = find_walls(
-        Structure.from_opaque(Opaque.from_scene(scene, SubdivideOptions()), scene.tolerance), 2.0
+        Structure.from_fabric(Fabric.from_scene(scene, SubdivideOptions()), scene.tolerance), 2.0
     )
     assert len(tried) < len(scene.triangles) / 2
     assert any(abs(w.frame.plane[3] + 0.02) < 1e-4 and w.blocking.area > 10 for w in walls)

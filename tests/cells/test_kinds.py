@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.roles import Designated
+from ptmtools.cells.fabric import Fabric
 from ptmtools.scene.model import Kind, Scene
 from tests.cells.doored_rooms import leaf, leaf_names, rooms, scene, solid
 from tests.cells.test_detail import ball
@@ -96,7 +96,7 @@ def test_the_user_comes_first(kind: Kind, option: str, pattern: str) -> None:
     """By the name of the object or by that of its material, which all objects share."""
     made = classed(scene(rooms(), thing=THING), thing=kind, masonry="structural")
     options = SubdivideOptions(**{option: (pattern,)})  # type: ignore[arg-type]
-    printed = Designated.from_options(made, options)
+    printed = Fabric.from_scene(made, options)
     thing = made.triangle_object == made.objects.index("thing")
     for name in ("structural", "detail", "door"):
         assert (getattr(printed, name)[thing] == (name == option)).all()

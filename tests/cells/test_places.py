@@ -13,10 +13,11 @@ import shapely
 
 from ptmtools.arrays import areas
 from ptmtools.cells import Cells, SubdivideOptions, places as places_module, subdivide
-from ptmtools.cells.floors import Floors, detail_of
+from ptmtools.cells.fabric import Fabric
+from ptmtools.cells.floors import Floors
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import find_places
-from ptmtools.cells.structure import Opaque, Structure
+from ptmtools.cells.structure import Structure
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.parallel import Local
@@ -28,8 +29,9 @@ SLACK = 0.02  # m², for circles that are polygons
 
 
 def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> float:  # noqa: B008
-    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
-    floors = Floors.from_scene(scene, detail_of(scene, structure, options))
+    fabric = Fabric.from_scene(scene, options)
+    structure = Structure.from_fabric(fabric, scene.tolerance)
+    floors = Floors.from_fabric(fabric)
     places = find_places(floors, structure.corners, Walker(*options.walker), scene.tolerance)
     return float(areas(places.only(places.front).triangles(scene.tolerance)).sum())
 
@@ -76,8 +78,9 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         ceiling = floor_of(0, 8, -2, 2, above, 4)
         options = SubdivideOptions()
         scene = scene_of([ramp, ceiling])
-        structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
-        floors = Floors.from_scene(scene, detail_of(scene, structure, options))
+        fabric = Fabric.from_scene(scene, options)
+        structure = Structure.from_fabric(fabric, scene.tolerance)
+        floors = Floors.from_fabric(fabric)
         places = find_places(floors, structure.corners, WALKER, scene.tolerance)
         actual = places.only(places.front).triangles(scene.tolerance)
         below = actual[:, :, 1].mean(axis=1) < actual[:, :, 0].mean(axis=1) / 2 + above / 2
@@ -258,11 +261,11 @@ def rough_floor(step: float) -> list:
 def test_a_scanned_floor_is_searched_in_patches() -> None:
     faces = [*rough_floor(0.03), wall_at(2, 0.2, 3, 0, 3)]
     scene, options = scene_of(faces), SubdivideOptions()
-    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
-    detail = detail_of(scene, structure, options)
-    floors = Floors.from_scene(scene, detail, grain=0.125)
+    fabric = Fabric.from_scene(scene, options)
+    structure = Structure.from_fabric(fabric, scene.tolerance)
+    floors = Floors.from_fabric(fabric, grain=0.125)
     assert floors.patch.all()
-    assert len(floors.slope) < len(Floors.from_scene(scene, detail).slope) / 10
+    assert len(floors.slope) < len(Floors.from_fabric(fabric).slope) / 10
     places = find_places(floors, structure.corners, WALKER, scene.tolerance)
     # Patches overlap at their rims.
     covered = shapely.union_all(places.plan)
@@ -272,8 +275,9 @@ def test_a_scanned_floor_is_searched_in_patches() -> None:
 def test_workers_find_the_same_places(monkeypatch: pytest.MonkeyPatch) -> None:
     faces = [*rough_floor(0.2), wall_at(2, 0.2, 3, 0, 3)]
     scene, options = scene_of(faces), SubdivideOptions()
-    structure = Structure.from_opaque(Opaque.from_scene(scene, options), scene.tolerance)
-    floors = Floors.from_scene(scene, detail_of(scene, structure, options))
+    fabric = Fabric.from_scene(scene, options)
+    structure = Structure.from_fabric(fabric, scene.tolerance)
+    floors = Floors.from_fabric(fabric)
     monkeypatch.setattr(places_module, "_BLOCK", 50)
     monkeypatch.setattr(places_module, "_MANY_BLOCKS", 2)
     here = find_places(floors, structure.corners, WALKER, scene.tolerance)

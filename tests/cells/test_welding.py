@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.cells import search
-from ptmtools.cells.facets import Welded, across_edges
+from ptmtools.cells.fabric import Welded, across_edges
 from ptmtools.cells.search import connect, distinct
 
 ROWS = st.lists(st.tuples(*[st.sampled_from([0.0, -0.0, 1.0, 2.0**60, 1e-300])] * 3), max_size=40)

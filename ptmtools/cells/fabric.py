@@ -1,22 +1,37 @@
-"""Facets: flat regions of a welded mesh, in as few triangles as their outlines need.
+"""The fabric of a building: the faces of a scene in flat regions, and their roles.
 
-Triangles that share edges and lie in one plane are gathered into regions; a region of many is
-replaced by as few as its outline allows, if that saves three quarters. No corner moves. Corners are
-left out only where an outline runs on straight, so a crack beside one is narrower than a hairline.
+**Facets.** Triangles that share edges and lie in one plane are gathered into regions; a region of
+many is replaced by as few as its outline allows, if that saves three quarters. No corner moves.
+Corners are left out only where an outline runs on straight, so a crack beside one is narrower than
+a hairline.
+
+**Roles** are structural, detail or door, by the names and classes of objects and by shape. The
+class of an object acts like an option that names the object, unless the user names the triangle in
+`--structural`, `--detail` or `--door`; but triangles that are structural by class divide the
+building only if their area suffices. Detail by shape is furniture, statues and plants: small, dense
+and round connected pieces, or whole objects, since a plant is a thousand pieces. Errors are safe:
+detail hides nothing, so visible sets can only grow.
 """
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import partial
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
+from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import build_areas, count, simplify, triangulate_polygons
 from ptmtools.cells.planes import UPWARD, plane_axes
-from ptmtools.cells.search import distinct
+from ptmtools.cells.search import connect, distinct
+from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance, rank
 
 
@@ -193,3 +208,153 @@ class Facets:
         count(["triangles"] * len(crossed))
         kept = ~np.isin(which, crossed)
         return space.reshape(-1, 3)[origin.reshape(-1, 3)[kept]], which[kept]
+
+
+#: Words for a door, in lower case.
+_DOOR = re.compile(
+    r"doors?|port[ea]s?|puertas?|tür(en)?|tuer(en)?|deur(en)?|dörr(ar)?|døre?r?|drzwi|dv[eě]ře|ajtó|"
+    r"двер[ьи]"
+)
+#: Compounds that end in such a word, like Haustür, or begin with it, like doorleaf.
+_COMPOUND = re.compile(
+    r".*(doors?|tür|tuer|deur|dörr|dør)|"
+    r"(door|tür|tuer|deur|dörr|dør)(leaf|panel|slab|wing|blatt|flügel|fluegel|blad)"
+)
+#: Words that only end like one, and parts of a doorway that are no leaf.
+_NO_DOOR = re.compile(
+    r"(out|in)doors?|way|frame|jamb|lintel|casing|handle|knob|mat|walls?|wand|mur[ao]?|pared|"
+    r"pare[td]e|muur|vägg|væg|ściana|стена|rahmen|zarge|griff|cadre|dormant|marco|telaio|kozijn|karm"
+)
+#: Words of a name: runs of letters, each beginning where a capital follows a small letter.
+_WORD = re.compile(r"[^\W\d_]+")
+_HUMP = re.compile(r"(?<=[^\W\d_A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-Z])(?=[A-Z][a-z])")
+
+
+def matches(name: str, patterns: Sequence[str]) -> bool:
+    """Whether a name matches one of the patterns, with * and ?."""
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def is_door_name(name: str) -> bool:
+    """Whether a name is that of a door: `door_leaf_03`, `IfcDoor`, `Haustür`, but not `doorway`,
+    `door_frame` or `outdoor_wall`."""
+    composed = unicodedata.normalize("NFC", name)
+    words = [word.lower() for word in _WORD.findall(_HUMP.sub(" ", composed))]
+    if any(map(_NO_DOOR.fullmatch, words)):
+        return False
+    return any(_DOOR.fullmatch(word) or _COMPOUND.fullmatch(word) for word in words)
+
+
+#: Detail fits into a box of this side, metres: the longest sofas and shelves.
+LARGEST = 3.0
+#: It is dense: it has at least this many triangles,
+DENSE = 256
+#: and compact: neither a sheet nor a rod. Its box's shortest side over its longest.
+COMPACT = 0.1
+#: Flat regions smaller than this share of `SubdivideOptions.wall_area` neither split nor block.
+FLAT_SHARE = 0.01
+#: No flat region of it is larger than this share of `SubdivideOptions.wall_area`,
+LARGEST_FLAT_SHARE = 0.25
+#: and no more of its surface than this is flat.
+FLAT = 2 / 3
+
+
+def detail_by_shape(facets: Facets, object_of: NDArray[np.integer], wall_area: float) -> Bools:
+    """(n,) which triangles of a mesh are detail by shape; ``object_of``: (n,) their objects."""
+    result = np.zeros(len(object_of), dtype=bool)
+    if not len(object_of):
+        return result
+    corners = facets.mesh.corners
+    # The area of the flat region of each triangle: what could split or block.
+    region = np.where(facets.whole, facets.area, 0.0)[facets.region]
+    flat = np.where(region >= FLAT_SHARE * wall_area, facets.areas, 0.0)
+    for group in (connected_pieces(facets.mesh), np.unique(object_of, return_inverse=True)[1]):
+        size = np.bincount(group)
+        order, begin = np.argsort(group, kind="stable"), np.cumsum(size) - size
+        low = np.minimum.reduceat(corners[order].min(axis=1), begin)
+        high = np.maximum.reduceat(corners[order].max(axis=1), begin)
+        shortest, _, longest = np.sort(high - low, axis=1).T
+        detail = (size >= DENSE) & (longest <= LARGEST) & (shortest >= COMPACT * longest)
+        flat_area, area = (sum_by_group(group, part, len(size)) for part in (flat, facets.areas))
+        detail &= flat_area <= FLAT * area
+        detail &= np.maximum.reduceat(region[order], begin) <= LARGEST_FLAT_SHARE * wall_area
+        result |= detail[group]
+    return result
+
+
+def connected_pieces(mesh: Welded) -> Ints:
+    """(n,) the connected piece of each triangle; pieces share no corners."""
+    point = connect(len(mesh.point), mesh.triangle)
+    return np.unique(point[mesh.triangle[:, 0]], return_inverse=True)[1].reshape(-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fabric:
+    """The T faces of a scene with their roles by name and class, none structural and something
+    else; and the flat regions of the n that are opaque and no detail so."""
+
+    scene: Scene
+    options: SubdivideOptions
+    forced: Bools  # (T,) whether it divides the building whatever its area
+    structural: Bools  # (T,) forced, or structural by class
+    detail: Bools  # (T,)
+    door: Bools  # (T,)
+    facets: Facets
+    source: Ints  # (n,) the triangle of the scene that each is, ascending
+    shaped: Bools  # (n,) whether it is detail by shape
+
+    @staticmethod
+    def from_scene(scene: Scene, options: SubdivideOptions) -> Fabric:
+        """The roles that the options name, and otherwise those of the objects' classes."""
+        forced, detail, door = (
+            triangles_named(scene, partial(matches, patterns=patterns))
+            for patterns in (options.structural, options.detail, options.door)
+        )
+        structural = forced
+        if scene.kinds:
+            free = ~(forced | detail | door)
+            kind = np.array(scene.kinds)[scene.triangle_object]
+            structural = structural | (free & (kind == "structural"))
+            detail = detail | (free & (kind == "detail"))
+            door = door | (free & (kind == "door"))
+        detail &= ~structural
+        facets, source = facets_of(scene, np.flatnonzero(scene.opaque & ~detail))
+        shaped = np.zeros(len(source), dtype=bool)
+        if options.detail_by_shape:
+            shaped = detail_by_shape(facets, scene.triangle_object[source], options.wall_area)
+            shaped &= ~structural[source]
+        return Fabric(
+            scene=scene,
+            options=options,
+            forced=forced,
+            structural=structural,
+            detail=detail,
+            door=door & ~structural,
+            facets=facets,
+            source=source,
+            shaped=shaped,
+        )
+
+    def find_detail(self) -> Bools:
+        """(T,) which triangles are detail by name, class or shape, including glass."""
+        scene, detail = self.scene, self.detail.copy()
+        detail[self.source[self.shaped]] = True
+        glass = np.flatnonzero(~(scene.opaque | detail | self.structural))
+        if self.options.detail_by_shape and len(glass):
+            facets, source = facets_of(scene, glass)
+            owner, wall_area = scene.triangle_object[source], self.options.wall_area
+            detail[source] = detail_by_shape(facets, owner, wall_area)
+        return detail
+
+
+def triangles_named(scene: Scene, test: Callable[[str], bool]) -> Bools:
+    """(T,) which triangles have an object or a material whose name passes a test."""
+    objects = np.array([test(name) for name in scene.objects], dtype=bool)
+    materials = np.array([test(material.name) for material in scene.materials], dtype=bool)
+    return np.asarray(objects[scene.triangle_object] | materials[scene.triangle_material])
+
+
+def facets_of(scene: Scene, triangles: Ints) -> tuple[Facets, Ints]:
+    """The flat regions of some of a scene's triangles, and (n,) the triangle that each is."""
+    mesh = Welded.from_triangles(scene.points, scene.triangles[triangles])
+    return Facets.from_mesh(mesh, scene.tolerance), triangles[mesh.source]
