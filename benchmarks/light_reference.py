@@ -1,0 +1,476 @@
+"""Compares displayed pictures with path-traced ones: how far light is from what it would be.
+
+    python benchmarks/light_reference.py [lit-hall museum hospital FILE …] [--views 6] [--noise 2]
+        [--width 320] [--height 180] [--light none auto] [--out FOLDER]
+
+Mitsuba 3 traces the reference with all bounces, from the model's own file: geometry, textures and
+base colours as `ptmtools.scene` reads them, with the normals of smooth surfaces; metallic,
+roughness, emission and lamps of a GLB from its JSON, in colour. A model without lamps has a cloudy
+sky of `SKY` nits outside and ceilings that glow (`CEILING`); one with a sun has a sky of a fifth of
+its lux. Panes let light pass but for their opacity. Each view is traced in passes, and Open Image
+Denoise removes grain, until the standard error of the displayed picture is at most ``--noise`` of
+255, or there are as many passes as `_PASSES` allows.
+
+Exposure takes the mean of the reference's log luminance to `KEY`; then come the curve Khronos PBR
+Neutral and sRGB. Pictures of ``ptm render`` are compared as they are. *matt* is the same reference
+with all surfaces diffuse: the part of the difference that is light alone. The tables give the root
+mean square of 255 and FLIP, and the noise of the references; pictures lie beside each other in
+``--out``.
+
+Needs ``mitsuba`` and ``pyoidn`` (extra ``reference``). Mitsuba's compiled variant is used where
+``DRJIT_LIBLLVM_PATH`` names LLVM 16 or later (Debian: ``apt install libllvm19``); else the scalar
+one. A view takes one to three minutes of a processor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from ptmtools_samples.lit_hall import corner_normals
+from scenes import ROOT, model_file
+
+from ptmtools.arrays import Floats
+from ptmtools.glb import glb_chunks
+from ptmtools.scene import Scene, ingest
+from ptmtools.scene.model import Material
+from ptmtools_lab.measures import flip
+
+FOLDER = ROOT / "build/bench/light"
+#: Models that `ptm sample` writes: command and file.
+SAMPLES = {
+    "lit-hall": ("lit-hall --scale 0.5", "lit_hall.glb"),
+    "museum": ("museum", "museum.obj"),
+}
+#: Eyes and points to look at in the lit hall: each room, a doorway, the showcase, the figure.
+LIT_HALL = (
+    ((-6.5, 1.7, 2.5), (-13.2, 1.5, -3.0)),
+    ((-10.0, 1.7, -2.5), (-12.5, 1.4, 4.0)),
+    ((1.0, 1.7, 2.5), (-4.0, 1.2, -3.0)),
+    ((4.5, 1.7, 2.5), (1.5, 1.3, -3.5)),
+    ((6.0, 1.7, 0.0), (13.0, 1.5, -1.0)),
+    ((-4.5, 1.6, -3.0), (-2.7, 1.5, -1.4)),
+)
+#: Nits of a cloudy sky and its colour, and of ceilings; of the key, a share of white.
+SKY, BLUE, CEILING, WARM, KEY = 1.0, (0.85, 1.0, 1.25), 0.06, (1.2, 1.0, 0.8), 0.3
+#: A ceiling faces down, this far above the model's floor, metres.
+_OVER = 2.2
+#: Largest reflectance: with more, light hardly fades.
+_MOST = 0.98
+#: Bounces; paths of a pixel in a pass; least and most passes.
+_DEPTH, _PATHS, _PASSES = 12, 16, (4, 32)
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@dataclass(frozen=True)
+class EyeView:
+    """A view: eye and point to look at, world metres; vertical field of view, degrees."""
+
+    eye: tuple[float, ...]
+    look: tuple[float, ...]
+    field: float = 60.0
+
+
+@dataclass(frozen=True)
+class PathLamp:
+    """A lamp as the file has it: linear colour × candela, or × lux of a sun; world coordinates."""
+
+    kind: str
+    color: Floats
+    place: Floats
+    way: Floats
+    cone: tuple[float, float]
+
+
+def from_srgb(encoded: Floats) -> Floats:
+    """Linear light of sRGB values in [0, 1]."""
+    low = encoded / 12.92
+    return np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
+def to_srgb(light: Floats) -> Floats:
+    """sRGB values in [0, 1] of linear light."""
+    clipped = np.clip(light, 0, 1)
+    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+
+
+def neutral(light: Floats) -> Floats:
+    """Khronos PBR Neutral: (…, 3) exposed linear light to [0, 1]."""
+    start, desaturation = 0.8 - 0.04, 0.15
+    least = light.min(axis=-1, keepdims=True)
+    color = light - np.where(least < 0.08, least - 6.25 * least**2, 0.04)
+    peak = np.maximum(color.max(axis=-1, keepdims=True), 1e-9)
+    rest = 1 - start
+    top = 1 - rest * rest / (np.maximum(peak, start) + rest - start)
+    kept = 1 / (desaturation * (peak - top) + 1)
+    return np.where(peak < start, color, color * top / peak * kept + top * (1 - kept))
+
+
+def displayed(light: Floats, exposure: float) -> Floats:
+    """The picture of linear light, 0 to 255."""
+    return 255 * to_srgb(neutral(np.maximum(light, 0) * exposure))
+
+
+def exposure_of(light: Floats) -> float:
+    """The factor that takes the mean of the log luminance to `KEY`; extremes do not count."""
+    luminance = light @ _LUMINANCE
+    low, high = np.quantile(luminance, (0.02, 0.98))
+    return float(KEY / np.exp(np.log(np.clip(luminance, max(low, 1e-6), max(high, 1e-6))).mean()))
+
+
+def gltf_of(model: Path) -> dict[str, Any]:
+    """The JSON of a GLB; empty for other formats."""
+    return dict(json.loads(glb_chunks(model.read_bytes())[0][2])) if model.suffix == ".glb" else {}
+
+
+def path_lamps(tree: dict[str, Any], scene: Scene) -> list[PathLamp]:
+    """The lamps of a GLB in nodes without parents."""
+    name = "KHR_lights_punctual"
+    entries = tree.get("extensions", {}).get(name, {}).get("lights", [])
+    lamps = []
+    for node in tree.get("nodes", []):
+        index = node.get("extensions", {}).get(name, {}).get("light")
+        if index is None:
+            continue
+        entry = entries[index]
+        x, y, z, w = node.get("rotation", (0, 0, 0, 1))
+        way = -np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+        place = np.array(node.get("translation", (0, 0, 0)), float) - scene.space.origin
+        color = np.array(entry.get("color", (1, 1, 1)), float) * entry.get("intensity", 1.0)
+        spot = entry.get("spot", {})
+        cone = spot.get("innerConeAngle", 0.0), spot.get("outerConeAngle", math.pi / 4)
+        lamps.append(PathLamp(entry["type"], color, place * scene.space.metres, way, cone))
+    return lamps
+
+
+class PathTracer:
+    """Mitsuba's scene of a model; with ``matt``, all surfaces are diffuse and panes are absent."""
+
+    def __init__(self, model: Path, *, matt: bool) -> None:
+        import mitsuba
+
+        compiled = bool(os.environ.get("DRJIT_LIBLLVM_PATH"))
+        mitsuba.set_variant("llvm_ad_rgb" if compiled else "scalar_rgb")
+        self._mitsuba, self._matt = mitsuba, matt
+        self._scene, self._tree = ingest(model), gltf_of(model)
+        self._looks = {entry.get("name"): entry for entry in self._tree.get("materials", [])}
+        self._normal = corner_normals(self._scene.corners)
+        self._lamps = path_lamps(self._tree, self._scene)
+        # Light of lamps passes panes in the integrator for volumes only.
+        panes = not matt and any(m.transparent and m.image < 0 for m in self._scene.materials)
+        kind = "volpath" if panes else "path"
+        light = {"type": kind, "max_depth": _DEPTH}
+        guides = "albedo:albedo,normal:sh_normal"
+        self._integrator = mitsuba.load_dict({"type": "aov", "aovs": guides, "light": light})
+        self.seconds = 0.0
+        with tempfile.TemporaryDirectory() as folder:
+            self._traced = mitsuba.load_dict(self._description(Path(folder)))
+
+    def trace(self, view: EyeView, size: tuple[int, int], noise: float) -> tuple[Floats, float]:
+        """(height, width, 3) linear light, and the standard error of its picture, of 255."""
+        begin = process_time()
+        passes: list[Floats] = []
+        least, most = _PASSES
+        error = math.inf
+        while error > noise and len(passes) < most:
+            sensor = self._mitsuba.load_dict(self._sensor(view, size))
+            picture = self._mitsuba.render(
+                self._traced,
+                sensor=sensor,
+                integrator=self._integrator,
+                spp=_PATHS,
+                seed=len(passes),
+            )
+            passes.append(np.nan_to_num(np.array(picture, np.float32)))
+            light = denoise(np.mean(passes, axis=0))
+            if len(passes) >= least:
+                exposure = exposure_of(light)
+                halves = [denoise(np.mean(passes[k::2], axis=0)) for k in (0, 1)]
+                # Half of the difference of two halves is one sample of the error of their mean.
+                error = rms(*(displayed(half, exposure) for half in halves)) / 2
+        self.seconds += process_time() - begin
+        return light, error
+
+    def _description(self, folder: Path) -> dict[str, Any]:
+        scene, lamps = self._scene, self._lamps
+        description: dict[str, Any] = {"type": "scene"}
+        ceilings = self._ceilings() if not lamps else np.zeros(len(scene.triangles), np.bool_)
+        for k, material in enumerate(scene.materials):
+            pane = material.transparent and material.image < 0
+            if pane and self._matt:
+                continue
+            for glowing in (False, True):
+                chosen = np.flatnonzero((scene.triangle_material == k) & (ceilings == glowing))
+                if not len(chosen):
+                    continue
+                shape = self._shape(folder / f"{k}-{glowing}.ply", chosen)
+                shape["bsdf"] = _pane(material) if pane else self._surface(material)
+                radiance = CEILING * SKY * np.array(WARM) if glowing else self._emission(material)
+                if radiance.any():
+                    shape["emitter"] = {"type": "area", "radiance": rgb(radiance)}
+                description[f"material_{k}_{glowing}"] = shape
+        suns = [lamp for lamp in lamps if lamp.kind == "directional"]
+        sky = suns[0].color.mean() / 5 if suns else SKY
+        description["sky"] = {"type": "constant", "radiance": rgb(sky * np.array(BLUE))}
+        for k, lamp in enumerate(lamps):
+            description[f"lamp_{k}"] = self._emitter(lamp)
+        return description
+
+    def _ceilings(self) -> NDArray[np.bool_]:
+        """(T,) level faces that look down on a room."""
+        scene = self._scene
+        down = self._normal[:, 0, 1] < -0.9
+        return down & (scene.corners[..., 1].mean(axis=1) > scene.points[:, 1].min() + _OVER)
+
+    def _shape(self, file: Path, chosen: NDArray[np.intp]) -> dict[str, Any]:
+        count = len(chosen)
+        mesh = self._mitsuba.Mesh(
+            file.stem, 3 * count, count, has_vertex_normals=True, has_vertex_texcoords=True
+        )
+        fields = self._mitsuba.traverse(mesh)
+        fields["vertex_positions"] = self._scene.corners[chosen].ravel().astype(np.float32)
+        fields["vertex_normals"] = self._normal[chosen].ravel().astype(np.float32)
+        fields["vertex_texcoords"] = self._scene.uv[chosen].ravel().astype(np.float32)
+        fields["faces"] = np.arange(3 * count, dtype=np.uint32)
+        fields.update()
+        mesh.write_ply(str(file))
+        return {"type": "ply", "filename": str(file)}
+
+    def _surface(self, material: Material) -> dict[str, Any]:
+        look = self._looks.get(material.name, {}).get("pbrMetallicRoughness", {})
+        metallic = look.get("metallicFactor", 1.0) if look else 0.0
+        roughness = look.get("roughnessFactor", 1.0) if look else 1.0
+        tint = np.minimum(from_srgb(np.array(material.color)), _MOST)
+        color: dict[str, Any] = rgb(tint)
+        if material.image >= 0:
+            color = {
+                "type": "bitmap",
+                "bitmap": self._mitsuba.Bitmap(
+                    self._texels(material.image) * tint.astype(np.float32)
+                ),
+                "raw": True,
+                "wrap_mode": "repeat" if material.wrap_s == "repeat" else "clamp",
+            }
+        surface: dict[str, Any]
+        if self._matt or (roughness >= 1 and metallic == 0):
+            surface = {"type": "diffuse", "reflectance": color}
+        else:
+            surface = {
+                "type": "principled",
+                "base_color": color,
+                "metallic": metallic,
+                "roughness": max(roughness, 0.03),
+                "specular": 0.5,
+            }
+        return {"type": "twosided", "surface": surface}
+
+    @cache  # noqa: B019 - a tracer lives as long as its model
+    def _texels(self, index: int) -> NDArray[np.float32]:
+        """(h, w, 3) linear light of an image, upside down as Mitsuba has v, at most 512 a side."""
+        with Image.open(BytesIO(self._scene.images[index].load())) as image:
+            small = image.convert("RGB")
+            small.thumbnail((512, 512), Image.Resampling.BOX)
+            return np.minimum(from_srgb(np.asarray(small)[::-1] / 255), _MOST).astype(np.float32)
+
+    def _emission(self, material: Material) -> Floats:
+        entry = self._looks.get(material.name, {})
+        strong = entry.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+        factor = np.array(entry.get("emissiveFactor", (0, 0, 0)), float)
+        return factor * strong.get("emissiveStrength", 1.0)
+
+    def _emitter(self, lamp: PathLamp) -> dict[str, Any]:
+        transform, color = self._mitsuba.ScalarTransform4f, rgb(lamp.color)
+        if lamp.kind == "directional":
+            return {"type": lamp.kind, "direction": lamp.way.tolist(), "irradiance": color}
+        if lamp.kind == "point":
+            return {"type": lamp.kind, "position": lamp.place.tolist(), "intensity": color}
+        up = [0, 1, 0] if abs(lamp.way[1]) < 0.99 else [1, 0, 0]
+        return {
+            "type": "spot",
+            "to_world": transform().look_at(
+                lamp.place.tolist(), (lamp.place + lamp.way).tolist(), up
+            ),
+            "intensity": color,
+            "beam_width": math.degrees(lamp.cone[0]),
+            "cutoff_angle": math.degrees(lamp.cone[1]),
+        }
+
+    def _sensor(self, view: EyeView, size: tuple[int, int]) -> dict[str, Any]:
+        eye, look = list(view.eye), list(view.look)
+        return {
+            "type": "perspective",
+            "fov_axis": "y",
+            "fov": view.field,
+            "near_clip": 0.02,
+            "to_world": self._mitsuba.ScalarTransform4f().look_at(eye, look, [0, 1, 0]),
+            "film": {
+                "type": "hdrfilm",
+                "width": size[0],
+                "height": size[1],
+                "rfilter": {"type": "box"},
+                "pixel_format": "rgb",
+                "component_format": "float32",
+            },
+            "sampler": {"type": "independent", "sample_count": _PATHS},
+        }
+
+
+def denoise(picture: NDArray[np.float32]) -> Floats:
+    """(h, w, 3) light of (h, w, 9) light, albedo and normal, by Open Image Denoise."""
+    import pyoidn
+
+    device = pyoidn.Device()
+    device.commit()
+    work = pyoidn.Filter(device, "RT")
+    height, width, _ = picture.shape
+    result = np.zeros((height, width, 3), np.float32)
+    parts = [np.ascontiguousarray(picture[..., k : k + 3]) for k in (0, 3, 6)]
+    names = (pyoidn.OIDN_IMAGE_COLOR, pyoidn.OIDN_IMAGE_ALBEDO, pyoidn.OIDN_IMAGE_NORMAL)
+    for name, part in zip((*names, pyoidn.OIDN_IMAGE_OUTPUT), (*parts, result), strict=True):
+        work.set_image(name, part, pyoidn.OIDN_FORMAT_FLOAT3, width, height)
+    work.set_bool("hdr", True)
+    work.commit()
+    work.execute()
+    return result.astype(np.float64)
+
+
+def _pane(material: Material) -> dict[str, Any]:
+    """A polished sheet that is there by its opacity: light passes without refraction."""
+    gloss = {
+        "type": "principled",
+        "base_color": rgb(from_srgb(np.array(material.color))),
+        "roughness": 0.03,
+        "specular": 0.5,
+    }
+    sheet = {"type": "twosided", "surface": gloss}
+    return {"type": "mask", "opacity": max(material.opacity, 0.04), "sheet": sheet}
+
+
+def rgb(color: Floats) -> dict[str, Any]:
+    """A colour of Mitsuba."""
+    return {"type": "rgb", "value": [float(c) for c in color]}
+
+
+def rms(first: Floats, second: Floats) -> float:
+    """The root mean square of the difference."""
+    return float(np.sqrt(np.mean((first - second) ** 2)))
+
+
+def ptm(*words: object) -> None:
+    """Runs a command; its output is shown if it fails."""
+    command = [sys.executable, "-m", "ptmtools", *map(str, words)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    if result.returncode:
+        sys.exit(f"{' '.join(command)}: exit status {result.returncode}\n{result.stderr}")
+
+
+def model_of(name: str) -> Path:
+    """The file of a model, which is written if it is a missing sample."""
+    if name not in SAMPLES:
+        return model_file(name)
+    words, file = SAMPLES[name]
+    folder = FOLDER / name
+    if not (folder / file).is_file():
+        ptm("sample", *words.split(), "-o", folder)
+    return folder / file
+
+
+def database_of(name: str, model: Path, light: str) -> Path:
+    """A database of a model with this option of light, built if it is missing."""
+    target = FOLDER / f"{Path(name).stem}-{light}.db"
+    ptm("build-scene", model, "-o", target, "--light", light)
+    return target
+
+
+def views_of(name: str, database: Path, count: int) -> list[EyeView]:
+    """The first viewpoints of a database; of the lit hall those of `LIT_HALL`."""
+    if name == "lit-hall":
+        return [EyeView(eye, look) for eye, look in LIT_HALL[:count]]
+    hints = json.loads((database / "www/hints.json").read_text())
+    views = []
+    for point in hints["viewpoints"][:count]:
+        look = np.array(point["position"]) + point["direction"]
+        field = math.degrees(point["fieldOfView"])
+        views.append(EyeView(tuple(point["position"]), tuple(look.tolist()), field))
+    return views
+
+
+def render(database: Path, view: EyeView, size: tuple[int, int], file: Path) -> Floats:
+    """The picture of ``ptm render``, 0 to 255."""
+    eye, look = (",".join(f"{v:.6f}" for v in point) for point in (view.eye, view.look))
+    words = ["--eye", eye, "--look", look, "--field-of-view", f"{view.field:.4f}"]
+    ptm("render", database, *words, "--width", size[0], "--height", size[1], "--force", "-o", file)
+    with Image.open(file) as image:
+        return np.asarray(image.convert("RGB"), np.float64)
+
+
+def compare(name: str, given: argparse.Namespace) -> None:
+    """Prints the table of a model, and writes its pictures beside each other."""
+    model = model_of(name)
+    databases = {light: database_of(name, model, light) for light in given.light}
+    size = given.width, given.height
+    views = views_of(name, next(iter(databases.values())), given.views)
+    tracers = {kind: PathTracer(model, matt=kind == "matt") for kind in ("whole", "matt")}
+    columns = [f"{light}: {kind}" for light in databases for kind in tracers]
+    print(
+        f"\n## {name}\n\n| view | noise | {' | '.join(columns)} |\n|---|--:|{'--:|' * len(columns)}"
+    )
+    table = []
+    for k, view in enumerate(views):
+        traced = {kind: tracer.trace(view, size, given.noise) for kind, tracer in tracers.items()}
+        exposure = exposure_of(traced["whole"][0])
+        truth = {kind: displayed(light, exposure) for kind, (light, _) in traced.items()}
+        file = given.out / f"{Path(name).stem}-{k}.png"
+        shown = {light: render(db, view, size, file) for light, db in databases.items()}
+        pairs = [(truth[kind], picture) for picture in shown.values() for kind in truth]
+        row = [(rms(*pair), flip(*pair)) for pair in pairs]
+        table.append(row)
+        noise = max(error for _, error in traced.values())
+        print(f"| {k} | {noise:.1f} | {' | '.join(cells_of(row))} |", flush=True)
+        beside = np.concatenate([*shown.values(), *truth.values()], axis=1)
+        Image.fromarray(np.rint(beside).astype(np.uint8)).save(file)
+    means = [tuple(map(float, pair)) for pair in np.mean(table, axis=0)]
+    print(f"| **mean** | | {' | '.join(cells_of(means))} |")
+    print(f"\n{sum(tracer.seconds for tracer in tracers.values()):.0f} s of path tracing (CPU)")
+
+
+def cells_of(row: Sequence[tuple[float, ...]]) -> list[str]:
+    """Cells of a table: root mean square, FLIP."""
+    return [f"{error:.1f} / {difference:.3f}" for error, difference in row]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("models", nargs="*", default=["lit-hall", "museum", "hospital"])
+    parser.add_argument("--views", type=int, default=6)
+    parser.add_argument("--noise", type=float, default=2.0)
+    parser.add_argument("--width", type=int, default=320)
+    parser.add_argument("--height", type=int, default=180)
+    parser.add_argument("--light", nargs="*", default=["none", "auto"])
+    parser.add_argument("--out", type=Path, default=FOLDER / "pictures")
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    print("RMS of 255 / FLIP against the path-traced picture, whole and matt")
+    for name in given.models:
+        compare(name, given)
+
+
+if __name__ == "__main__":
+    main()
