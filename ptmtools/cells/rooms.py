@@ -15,7 +15,7 @@ lifts, but a door within a flat still divides. Regions in two volumes never join
 volume, such as doorways, join as above. A volume of which no region has more than two thirds
 consists of several rooms, and does not count.
 
-**Cells.** A room is one cell, unless dividing it gains enough (`groups`). Cells never reach through
+**Cells.** A room is one cell, unless dividing it gains enough (`sight`). Cells never reach through
 a door.
 
 **Order.** Leaves are ranked by the geometry of the model file that each holds (`rank_in_file`).
@@ -31,13 +31,20 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
-from ptmtools.cells.groups import DIGITS, Groups, gain_of, join_by_gain
 from ptmtools.cells.model import Cells
 from ptmtools.cells.named_rooms import Volumes, name_cells, unused_notes
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry
 from ptmtools.cells.search import connect
-from ptmtools.cells.sight import from_places, portals_of, sampled_sight
+from ptmtools.cells.sight import (
+    DIGITS,
+    Groups,
+    from_places,
+    gain_of,
+    join_by_gain,
+    portals_of,
+    sampled_sight,
+)
 from ptmtools.diagnostics import Warned
 from ptmtools.tolerance import TIE_SHARE
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.groups import join_by_gain
 from ptmtools.cells.rooms import _in_order
-from ptmtools.cells.sight import _even, _lines, portals_of, sampled_sight
+from ptmtools.cells.sight import _even, _lines, join_by_gain, portals_of, sampled_sight
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.groups import join_by_gain
 from ptmtools.cells.model import EyeRegion
 from ptmtools.cells.options import WALKER
+from ptmtools.cells.sight import join_by_gain
 from ptmtools.coverage.placement import CellVolume
 from ptmtools.diagnostics import Warned
 from ptmtools.scene.model import Camera, Scene
