@@ -19,7 +19,6 @@ from ptmtools.lazy import Lazy
 if TYPE_CHECKING:
     from ptmtools.output.model import TextureRecord
     from ptmtools.output.object_maps import ObjectMaps
-    from ptmtools.output.served import Served
 
 #: A row of a list in the index of the hints.
 Row = Mapping[str, Any]
@@ -37,9 +36,9 @@ class Representation:
     folder: of its files in the served folder.
     script: of the page that draws it.
     check: function that checks the rows in ``hints`` and their files in a served database.
-    painter: opens the painter of a served database that has such a list, an `ObjectPainter` of
+    painter: opens the painter of a `Served` database that has such a list, an `ObjectPainter` of
         `ptmtools.rendering.painting`.
-    published: from a served database and the file and SHA-256 of a URL to the rows of a site's
+    published: from a `Served` database and the file and SHA-256 of a URL to the rows of a site's
         index, each with its file.
     warm_up: calls the compiled kernels that making and drawing it need.
     """
@@ -50,9 +49,9 @@ class Representation:
     folder: str
     script: str
     check: Lazy[Callable[[Any, Any], None]]
-    painter: Lazy[Callable[[Served], Any]]
+    painter: Lazy[Callable[[Any], Any]]
     published: Lazy[
-        Callable[[Served, Callable[[str], tuple[Path, str]]], Iterable[tuple[Row, Path, str]]]
+        Callable[[Any, Callable[[str], tuple[Path, str]]], Iterable[tuple[Row, Path, str]]]
     ]
     warm_up: Lazy[Callable[[], None]]
 

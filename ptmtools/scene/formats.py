@@ -8,8 +8,8 @@ file of the format is read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
@@ -17,27 +17,12 @@ from typing import TYPE_CHECKING, Literal
 from ptmtools import plugins
 from ptmtools.errors import InputError, LimitError, MissingComponentError
 from ptmtools.lazy import Lazy
+from ptmtools.scene.options import MAX_VERTICES, IngestOptions, damage, too_many_triangles
 
 if TYPE_CHECKING:
     from ptmtools.progress import Progress
     from ptmtools.scene.notes import IngestNotes
-    from ptmtools.scene.options import IngestOptions
-    from ptmtools.scene.source import ModelSource, SecondReading
-
-#: `Scene.triangles` is int32: more vertices cannot be numbered.
-MAX_VERTICES = 2**31 - 1
-#: The textures of a material beside its colours that a second reading may ask for.
-Purpose = Literal["lightmap", "reflection"]
-
-
-@dataclass(frozen=True)
-class FileFacts:
-    """The version of its format and the program that wrote it, both "" if a file does not state
-    them; and its extensions by name, with their support."""
-
-    version: str = ""
-    generator: str = ""
-    extensions: Mapping[str, str] = field(default_factory=dict)
+    from ptmtools.scene.source import FileFacts, ModelSource, Purpose, SecondReading
 
 
 @dataclass(frozen=True)
@@ -97,21 +82,6 @@ class ModelFormat:
             message = f"more than {MAX_VERTICES} vertices or faces"
             raise LimitError("PTM-L203", message, file=model, remedy="split the model")
         return source
-
-
-def damage(model: Path, reason: str) -> InputError:
-    """The error for a file that is damaged, PTM-I254."""
-    return InputError("PTM-I254", f"damaged ({reason})", file=model, remedy="export it again")
-
-
-def too_many_triangles(limit: int, file: Path) -> LimitError:
-    """The error for a model of more triangles than the limit, PTM-L203."""
-    return LimitError(
-        "PTM-L203",
-        f"has more than {limit:,} triangles",
-        file=file,
-        remedy="raise the limit (--max-triangles), or split the model",
-    )
 
 
 OBJ = ModelFormat(

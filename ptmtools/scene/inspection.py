@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.formats import FileFacts, format_of
+from ptmtools.scene.formats import format_of
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
@@ -22,6 +22,7 @@ from ptmtools.scene.orientation.up_axis import (
     candidates,
     evidence,
 )
+from ptmtools.scene.source import FileFacts
 from ptmtools.texture.images.opening import open_image
 from ptmtools.texture.model import Limits
 

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.lazy import pymeshlab_absence
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.formats import damage
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.options import IngestOptions, damage
 from ptmtools.scene.sandbox import run_in_sandbox, serve
 from ptmtools.scene.source import MeshArrays, ModelSource, SourceMaterial
 

@@ -25,11 +25,10 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import luminance
-from ptmtools.scene.formats import MAX_VERTICES, too_many_triangles
 from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.options import MAX_VERTICES, IngestOptions, too_many_triangles
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
     FileRange,

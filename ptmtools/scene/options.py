@@ -1,11 +1,16 @@
-"""Options of ingest."""
+"""Options of ingest, and the errors for models beyond its limits."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar, Literal
 
+from ptmtools.errors import InputError, LimitError
 from ptmtools.options import option, require
+
+#: `Scene.triangles` is int32: more vertices cannot be numbered.
+MAX_VERTICES = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -63,3 +68,18 @@ class IngestOptions:
             from ptmtools.scene.orientation.space import parse_unit
 
             parse_unit(self.unit)
+
+
+def damage(model: Path, reason: str) -> InputError:
+    """The error for a file that is damaged, PTM-I254."""
+    return InputError("PTM-I254", f"damaged ({reason})", file=model, remedy="export it again")
+
+
+def too_many_triangles(limit: int, file: Path) -> LimitError:
+    """The error for a model of more triangles than the limit, PTM-L203."""
+    return LimitError(
+        "PTM-L203",
+        f"has more than {limit:,} triangles",
+        file=file,
+        remedy="raise the limit (--max-triangles), or split the model",
+    )

@@ -9,7 +9,7 @@ A reader resolves the names of textures to files but opens no image: only the cl
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -186,6 +186,20 @@ class ModelSource:
     storeys: tuple[Storey, ...] = ()
     rooms: tuple[RoomVolume, ...] = ()
     lamps: tuple[Lamp, ...] = ()
+
+
+#: The textures of a material beside its colours that a second reading may ask for.
+Purpose = Literal["lightmap", "reflection"]
+
+
+@dataclass(frozen=True)
+class FileFacts:
+    """The version of its format and the program that wrote it, both "" if a file does not state
+    them; and its extensions by name, with their support."""
+
+    version: str = ""
+    generator: str = ""
+    extensions: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from ptmtools.diagnostics import CODES, Findings, Place, ValidationReport, one_l
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
 from ptmtools.output.emitter import GZIP, Emitter
-from ptmtools.output.emitters import all_emitters, chosen_emitters, owner_of
+from ptmtools.output.emitters import EMITTERS, all_emitters, chosen_emitters, owner_of
 from ptmtools.output.model import FileError
 from ptmtools.output.names import HINTS, TEXTURE_FOLDER
 from ptmtools.output.options import EmitOptions
@@ -142,6 +142,7 @@ class _DatabaseCheck:
         served = served_files(self._folder / SERVED, self.findings)
         check_names(served, self.findings)
         database = ServedDatabase(self._folder / SERVED, served, self.findings, self._limits)
+        database.forms = EMITTERS.values()
         ours = self._ours = {path for path in served if self._is_ours(path)}
         self._note_foreign([path for path in served if path not in ours])
         self._read_files(database, progress, workers)

@@ -16,6 +16,7 @@ from urllib.parse import unquote_to_bytes
 
 from ptmtools.diagnostics import Findings, Issue, Place
 from ptmtools.files import open_regular
+from ptmtools.output.emitter import Emitter
 from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
 
@@ -151,6 +152,7 @@ class ServedDatabase:
         served image, and the result of the form's reader of other files.
     hints: None without a readable index.
     named: the files that some URL names.
+    forms: the emitters of `--format`.
     """
 
     def __init__(
@@ -165,6 +167,7 @@ class ServedDatabase:
         self.contents: dict[str, Any] = {}
         self.hints: ReadHints | None = None
         self.named: set[str] = set()
+        self.forms: Iterable[Emitter] = ()
         self._findings = findings
         self._folded = {file.casefold(): file for file in sorted(self.files)}
         self._known: dict[tuple[str, str], tuple[str, str]] = {}

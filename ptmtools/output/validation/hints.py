@@ -10,7 +10,6 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.diagnostics import Place
-from ptmtools.output.emitters import EMITTERS
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, convert_shape_errors, sizes_of
@@ -100,7 +99,7 @@ def check_files(database: ServedDatabase) -> None:
         urls = hints.cell_urls(template)
         if database.files.isdisjoint(urls):  # else the check of the form compares its files
             database.resolve_each(HINTS, "geometry", urls)
-        elif form not in EMITTERS or not EMITTERS[form].is_owner(template):
+        elif not any(e.name == form and e.is_owner(template) for e in database.forms):
             at.add("PTM-D700", "names files of another form", f"geometry.{form}")
     for i, view in enumerate(index["viewpoints"]):
         if not index["cells"][view["cell"]].get("standing", True):

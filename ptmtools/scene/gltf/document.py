@@ -26,10 +26,9 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.glb import BINARY, COMPONENTS, ITEMS, MAGIC, elements, glb_chunks, meaning, natural
 from ptmtools.meshopt.decoding import EXTENSIONS, decode as decode_view
-from ptmtools.scene.formats import FileFacts
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.reference import ModelFolder
-from ptmtools.scene.source import FileRange, HeldBytes, decode
+from ptmtools.scene.source import FileFacts, FileRange, HeldBytes, decode
 
 #: A surrogate in JSON; a single one is not valid text.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")

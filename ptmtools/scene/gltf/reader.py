@@ -21,7 +21,6 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.glb import COMPONENTS, meaning, natural
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import encode_srgb
-from ptmtools.scene.formats import MAX_VERTICES, Purpose, too_many_triangles
 from ptmtools.scene.gltf.compression import DRACO, DracoPrimitive, decode_primitives
 from ptmtools.scene.gltf.document import (
     FAULTS,
@@ -35,8 +34,8 @@ from ptmtools.scene.gltf.document import (
 from ptmtools.scene.gltf.material import GltfMaterialReader, MaterialUse, TextureOf
 from ptmtools.scene.gltf.nodes import cameras, instance_count, instances, lamps, world_matrices
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.options import IngestOptions
-from ptmtools.scene.source import MeshArrays, ModelSource, SecondReading
+from ptmtools.scene.options import MAX_VERTICES, IngestOptions, too_many_triangles
+from ptmtools.scene.source import MeshArrays, ModelSource, Purpose, SecondReading
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 #: Largest number of vertices per allowed triangle.

@@ -29,7 +29,6 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.scene.formats import too_many_triangles
 from ptmtools.scene.ifc.entities import (
     FAULTS,
     GLOW,
@@ -51,6 +50,7 @@ from ptmtools.scene.ifc.entities import (
 from ptmtools.scene.messages import pack_source
 from ptmtools.scene.model import RoomVolume
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import too_many_triangles
 from ptmtools.scene.sandbox import reply_so_far, serve, unreadable
 from ptmtools.scene.source import MeshArrays, ModelSource, SourceMaterial
 

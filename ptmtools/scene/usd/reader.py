@@ -10,11 +10,10 @@ from __future__ import annotations
 import os
 import tempfile
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.formats import USD, USDZ
 from ptmtools.scene.messages import pack_source, read_in_sandbox
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.options import IngestOptions
@@ -51,11 +50,10 @@ def read_usd(
 def _bytes_of_layers(folder: Path) -> int:
     """The total size of the layers in a folder: a model often is a small layer that refers to
     others."""
-    suffixes = USD.suffixes + USDZ.suffixes
     size, count = 0, 0
     for parent, _, names in os.walk(folder):
         for name in names:
-            if name.lower().endswith(suffixes):
+            if PurePath(name.lower()).suffix.startswith(".usd"):
                 with suppress(OSError):
                     size += os.stat(os.path.join(parent, name)).st_size
         count += len(names) + 1

@@ -19,10 +19,10 @@ from pxr import Tf, Usd, UsdGeom
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
-from ptmtools.scene.formats import too_many_triangles
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import too_many_triangles
 from ptmtools.scene.sandbox import unreadable
 from ptmtools.scene.source import MeshArrays, ModelSource
 from ptmtools.scene.usd.layers import (

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.arrays import Floats
-from ptmtools.scene.formats import MAX_VERTICES
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import MAX_VERTICES
 from ptmtools.scene.source import ModelSource
 from tests.scene.conftest import read_source
 

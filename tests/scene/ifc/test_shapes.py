@@ -12,9 +12,9 @@ import pytest
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene import IngestOptions, ingest
-from ptmtools.scene.formats import MAX_VERTICES
 from ptmtools.scene.ifc import products as ifc_products
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import MAX_VERTICES
 from tests.scene.ifc.ifc_house import DEEP, HIGH, THICK, WIDE, Ifc, house
 from tests.scene.ifc.reading import corners, notes, read, size, volume
 

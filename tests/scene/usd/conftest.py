@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ptmtools.scene.formats import MAX_VERTICES
+from ptmtools.scene.options import MAX_VERTICES
 from tests.scene.usd.reading import Read
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.scene.formats import MAX_VERTICES
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import MAX_VERTICES
 from ptmtools.scene.source import ModelSource
 
 

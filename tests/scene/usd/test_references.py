@@ -10,8 +10,8 @@ import pytest
 
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, ingest
-from ptmtools.scene.formats import MAX_VERTICES
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import MAX_VERTICES
 from ptmtools.scene.source import FileRange
 from tests.scene.conftest import Put, noise, png, read_source
 
