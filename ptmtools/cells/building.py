@@ -29,7 +29,7 @@ from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.places import Places, find_places, spread
 from ptmtools.cells.planar import counting
 from ptmtools.cells.planes import Polyhedron, bounds
-from ptmtools.cells.portals import find_portals
+from ptmtools.cells.portals import ends_of, find_portals
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.cells.split_planes import Reveals
 from ptmtools.cells.structure import (
@@ -88,7 +88,7 @@ def _openings(tree: Tree, tolerance: Tolerance) -> Portals:
     portals = [portal for portal in find_portals(tree, tolerance) if not portal.passage]
     return Portals(
         leaf_count=len(tree.leaves),
-        leaf=np.array([portal.leaves for portal in portals], dtype=np.int32).reshape(-1, 2),
+        leaf=ends_of(portals).astype(np.int32),
         normal=tree.planes[[portal.node for portal in portals], :3].reshape(-1, 3),
         point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
         start=np.cumsum([0, *(len(portal.polygon) for portal in portals)]),

@@ -221,7 +221,6 @@ def ceiling_plane(
     if min(height - low, high - height) < tolerance.thin:
         return None
     frame = PlaneFrame.from_plane(np.array([0.0, 1.0, 0.0, -height]))
-    near = structure.nearby.find_between(frame.plane, -tolerance.plane, tolerance.plane)
-    blocking = structure.unite(frame, near[structure.lie_in(frame.plane, near)])
+    blocking = structure.unite(frame, structure.find_in(frame.plane))
     outline = section(body, frame.plane, tolerance.rounding)
     return WallPlane(frame, shapely.Polygon(frame.to_plane(outline)), blocking)

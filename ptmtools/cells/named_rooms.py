@@ -405,8 +405,8 @@ def split_at(
         contact = _best(around, body, options, tolerance)
         if contact is None:
             continue
-        node, back = len(walls), len(leaves)
-        parts = cut(body, contact.frame.plane, node, tolerance.rounding)
+        frame, node, back = contact.frame, len(walls), len(leaves)
+        parts = cut(body, frame.plane, node, tolerance.rounding)
         if parts[0] is None or parts[1] is None:
             raise AssertionError("a split that was accepted has two sides")
         if leaf in parent:
@@ -414,7 +414,8 @@ def split_at(
             children[at][side] = node
         children.append([-2 - leaf, -2 - back])
         parent[leaf], parent[back] = (node, 0), (node, 1)
-        walls.append(_plane(contact, structure))
+        blocking = structure.unite(frame, structure.find_in(frame.plane))
+        walls.append(WallPlane(frame, contact.shape, blocking))
         leaves[leaf] = parts[0]
         leaves.append(parts[1])
         stale.update([node, *(tag for tag in body.tags if tag >= 0)])
@@ -453,13 +454,3 @@ def _best(
         if share > best_share and not shapely.is_empty(buffer(shape, -radius, join_style="mitre")):
             best, best_share = contact, share
     return best
-
-
-def _plane(contact: Contact, structure: Structure) -> WallPlane:
-    """The plane of a contact, and the structure that blocks in it."""
-    plane = contact.frame.plane
-    near: Ints = structure.nearby.find_between(
-        plane, -structure.tolerance.plane, structure.tolerance.plane
-    )
-    blocking = structure.unite(contact.frame, near[structure.lie_in(plane, near)])
-    return WallPlane(contact.frame, contact.shape, blocking)

@@ -16,7 +16,7 @@ is reached as a whole or not at all, so the flood need not run again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 from typing import NamedTuple
@@ -93,6 +93,11 @@ class Portal(NamedTuple):
     polygon: Floats  # (n, 3) convex, counter-clockwise seen against the normal
     area: float  # m² open, of the piece before its hull
     passage: bool = False  # whether a door leaf covers it
+
+
+def ends_of(portals: Sequence[Portal]) -> Ints:
+    """(n, 2) the leaves of portals."""
+    return np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
 
 
 def find_portals(
@@ -210,8 +215,7 @@ FLOOR_COSINE = 0.7
 
 def flood(leaves: int, portals: list[Portal], start: tuple[int, ...]) -> Bools:
     """(L,) which of L = ``leaves`` are reached through the portals from the leaves ``start``."""
-    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
-    reached, count = np.zeros(leaves, dtype=bool), 0
+    ends, reached, count = ends_of(portals), np.zeros(leaves, dtype=bool), 0
     reached[list(start)] = True
     while count < (count := int(reached.sum())):
         reached[ends[reached[ends].any(axis=1)]] = True

@@ -28,6 +28,7 @@ from ptmtools.cells.planes import Polyhedron, bounds
 from ptmtools.cells.portals import (
     Portal,
     at_box,
+    ends_of,
     find_portals,
     flood,
     largest_leaf,
@@ -202,8 +203,7 @@ def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
 
 def groups(leaves: int, portals: list[Portal]) -> Ints:
     """(leaves,) the least leaf to which portals connect each."""
-    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
-    return connect(leaves, ends)
+    return connect(leaves, ends_of(portals))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -96,6 +96,12 @@ class Structure:
         lies: Bools = np.all(distance <= self.tolerance.plane, axis=1)
         return lies
 
+    def find_in(self, plane: Floats) -> Ints:
+        """The triangles that lie in a plane, ascending."""
+        slack = self.tolerance.plane
+        near = self.nearby.find_between(plane, -slack, slack)
+        return near[self.lie_in(plane, near)]
+
     def unite(self, frame: PlaneFrame, triangles: Ints) -> Geometry:
         """The union of these triangles in a plane."""
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
@@ -122,8 +128,7 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     walls_by_area: list[tuple[float, WallPlane]] = []
     for plane in _layers(structure, least):
         frame = PlaneFrame.from_plane(plane)
-        near = structure.nearby.find_between(plane, -tolerance.plane, tolerance.plane)
-        flat = near[structure.lie_in(plane, near)]
+        flat = structure.find_in(plane)
         if not _may_hold_wall(structure, frame, flat, least):
             continue
         blocking = structure.unite(frame, flat)

@@ -38,6 +38,7 @@ from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.places import eye_region, meets
 from ptmtools.cells.planar import count, counting
 from ptmtools.cells.planes import Polyhedron, bounds, boxes_meet
+from ptmtools.cells.portals import ends_of
 from ptmtools.cells.rooms import group_cells
 from ptmtools.cells.sight import seen_from_places
 from ptmtools.cells.space import DividedSpace, divide, divide_inside
@@ -148,8 +149,7 @@ def _cut_and_group(
 
 def _portal_count(space: DividedSpace) -> int:
     """The number of portals between reached leaves."""
-    ends = np.array([portal.leaves for portal in space.portals], dtype=np.int64).reshape(-1, 2)
-    return int(np.count_nonzero(space.reached[ends].all(axis=1)))
+    return int(np.count_nonzero(space.reached[ends_of(space.portals)].all(axis=1)))
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:
@@ -201,7 +201,7 @@ def assemble_cells(
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
     portals = sorted(portals, key=lambda portal: portal.passage)
-    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
+    ends = ends_of(portals)
     passage = np.array([portal.passage for portal in portals], dtype=np.bool_)
     standing, eye_floor, standing_notes = _viewers(building, space, bodies, rename)
     # The inside of a door leaf is no place.
