@@ -10,7 +10,7 @@
 # make bench-web     how soon a view is there, by the walk page and by what people do otherwise
 #                    (a day; it continues where it was stopped)
 # make fuzz    100,000 damaged and hostile files for every reader, 1,000 damaged buildings (an hour)
-# make page    bundle the page of web/page into the package, with esbuild; print its table of sizes
+# make page    bundle the page of web/page and web/systems into the packages, with esbuild; print its table of sizes
 # make dist    a wheel and an sdist in build/dist, with a bill of materials
 # make man     the manual page of ptm, in release/man (make dist packs it)
 # make sample  only the sample museum

@@ -64,7 +64,7 @@ from tests.e2e.browsers import web  # noqa: E402
 #: Window, pixels; poses a second; preset of a campus.
 WIDTH, HEIGHT, RATE, PRESET = 320, 240, 20, PRESETS[1]
 #: Distances from the object, diameters; levels of the first request, and bytes before the first
-#: level and after the last (`web/page/octree/octree.js`).
+#: level and after the last (`web/systems/octree/octree.js`).
 FAR, NEAR, FIRST, HEAD, CHECK = 8.0, 0.6, 7, 2, 4
 #: Poses the page from its first frame on, and records. `at` gives the arguments of a pose.
 SCRIPT = """

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ptmtools.site.program import PAGE
+from ptmtools_systems import PAGE as SYSTEMS_PAGE
 
 #: The first load, and all other files: feature → files. A file that is missing here is an error.
 FIRST = ("index.html", "viewer.js", "worker.js", "decoder.wasm")
@@ -45,13 +46,14 @@ def main() -> None:
 def rows() -> Iterator[str]:
     """Its lines. Raises ValueError: a file of the page belongs to no feature."""
     named = {*FIRST, *(name for names in FEATURES.values() for name in names)}
-    others = {file.name for file in PAGE.iterdir()} - named
+    files = {file.name: file for page in (PAGE, SYSTEMS_PAGE) for file in page.iterdir()}
+    others = files.keys() - named
     if strange := sorted(name for name in others if not name.startswith("words-")):
         raise ValueError(f"no feature has {', '.join(strange)}")
     yield "| feature | files | bytes |"
     yield "|---|---|--:|"
     for feature, names in {"every walk": FIRST, **FEATURES}.items():
-        total = sum(sent(PAGE / name) for name in names)
+        total = sum(sent(files[name]) for name in names)
         yield f"| {feature} | {', '.join(f'`{name}`' for name in names)} | {total:,} |"
 
 

@@ -54,7 +54,7 @@ class FolderKind:
     check: checks a folder.
     describe: the lines of ``ptm info`` for a folder, and its record as JSON. Raises the errors of
         reading the index.
-    schema: of the index. script: of the page that shows it.
+    schema: of the index. script: the file of the script of the page that shows it.
     files: of an index: the other files that the page fetches.
     records: whether the page shows HTML of others in frames.
     drawing: how ``ptm render`` draws it; None if it does not.
@@ -66,7 +66,7 @@ class FolderKind:
     check: Lazy[Callable[[Path, Limits], ValidationReport]]
     describe: Lazy[Callable[[Path], tuple[tuple[str, ...], Mapping[str, Any]]]]
     schema: str
-    script: str
+    script: Path
     files: Lazy[Callable[[Mapping[str, Any]], Iterable[str]]]
     records: bool = False
     drawing: FolderDrawing | None = None

@@ -23,12 +23,14 @@ class SiteTextures:
     ----------
     member: of the site's index, with the URL of the document that describes them.
     folder: of their files in the site.
+    script: the file of the script that walks with them.
     entries: function from (index of the hints, function from a URL of it to the file and its
         SHA-256) to the files, the document last.
     """
 
     member: str
     folder: str
+    script: Path
     entries: Lazy[Callable[[Mapping[str, Any], Callable[[str], tuple[Path, str]]], Iterable[Any]]]
 
 

@@ -34,7 +34,7 @@ class Representation:
     noun: of one of them in messages, such as "octree texture".
     member: of the "extras" of an object's node in GLBs, with the number of its row.
     folder: of its files in the served folder.
-    script: of the page that draws it.
+    script: the file of the script that draws it in a walk, ``statues.js``.
     check: function that checks the rows in ``hints`` and their files in a served database.
     painter: opens the painter of a `Served` database that has such a list, an `ObjectPainter` of
         `ptmtools.rendering.painting`.
@@ -47,7 +47,7 @@ class Representation:
     noun: str
     member: str
     folder: str
-    script: str
+    script: Path
     check: Lazy[Callable[[Any, Any], None]]
     painter: Lazy[Callable[[Any], Any]]
     published: Lazy[

@@ -37,7 +37,7 @@ from ptmtools.schemas import ShapeError, parse
 from ptmtools.site.editing import StaleError, TourEditor
 from ptmtools.site.entry import SiteEntry
 from ptmtools.site.lookup import Lookup
-from ptmtools.site.program import HTML, INDEX, JAVASCRIPT, script_file
+from ptmtools.site.program import HTML, INDEX, JAVASCRIPT, PAGE, read_built
 from ptmtools.tour.reading import LARGEST
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Editing:
 
         def find(name: str) -> SiteEntry | None:
             if _FOLDER.fullmatch(name):
-                return SiteEntry(name, script_file(SCRIPT), JAVASCRIPT, compressed=True)
+                return SiteEntry(name, read_built(PAGE / SCRIPT), JAVASCRIPT, compressed=True)
             return self.editor.media(name) or files(name)
 
         return find

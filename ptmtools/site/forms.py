@@ -1,8 +1,7 @@
 """The site of a folder that is no database (`ptmtools.folder_kinds`).
 
-Each kind has a page with a script of its own (``web/page/forms``), which the page of databases does
-not load. All files are in ``data-HASH``, with a hash of the index, which has the checksums of the
-others.
+Each kind brings the script of its page, which the page of databases does not load. All files are in
+``data-HASH``, with a hash of the index, which has the checksums of the others.
 """
 
 from __future__ import annotations

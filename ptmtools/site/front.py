@@ -16,14 +16,15 @@ from ptmtools.site.catalogue import ANGLE, CatalogueContent, catalogue_of
 from ptmtools.site.entry import SiteEntry
 from ptmtools.site.files import DATA, SiteFiles, add_manifest
 from ptmtools.site.program import (
+    ELEMENT,
     HTML,
+    WORKER,
     add_policy,
     address_of,
-    element,
+    fixed_script,
     page,
     program_files,
     registration,
-    worker,
 )
 from ptmtools.site.tours import SiteTour, site_tour
 from ptmtools.store.folder import DatabaseFolder
@@ -113,7 +114,7 @@ class Front:
         """Adds the files; returns the title of the page. Raises as `site_tour`; InputError
         PTM-I122: the program is incomplete."""
         program = program_files()
-        for entry in (*program.values(), element()):
+        for entry in (*program.values(), fixed_script(ELEMENT)):
             files.put(entry)
         tour = self._tour(files)
         title = (tour and tour.text("title")) or self.options.title or self.title
@@ -135,7 +136,7 @@ class Front:
         description = written or description_of(viewpoints, *([tour.place] if tour else []))
         head = [*About(title, description, self.poster, self.options.address).lines()]
         if self.options.offline:
-            files.put(worker())
+            files.put(fixed_script(WORKER))
             head.append(registration(program))
         files.put(page(settings, program["viewer.js"].name, preload, views, head))
         add_manifest(files, title)

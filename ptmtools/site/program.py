@@ -1,5 +1,6 @@
 """The page and its program, as ``web/page/build.py`` leaves them in ``page/``, and the policy of
-the page.
+the page. Packages that attach a representation, a form of textures or a kind of folders bring the
+scripts that draw them.
 
 The Content-Security-Policy is written into the page: static hosts send no such header. A page runs
 the scripts of its own site and those whose digests are listed, and nothing else, even if a text of
@@ -19,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import InputError
+from ptmtools.output.emitters import EMITTERS
+from ptmtools.output.representation import representations
 from ptmtools.site.entry import DIGITS, SiteEntry
 from ptmtools.site.words import LANGUAGES, words_of
 from ptmtools.store.layout import sha256
@@ -28,8 +31,8 @@ PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
 LATER = (
-    *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
-    *("register.js", "gamepad.js", "xr.js"),
+    *("later.js", "compare.js", "reliefs.js", "tour.js", "embedded.js", "register.js"),
+    *("gamepad.js", "xr.js"),
     *(f"words-{language}.js" for language in LANGUAGES if language != "en"),
 )
 #: The media type of each file.
@@ -43,8 +46,8 @@ PROGRAM = {
 ELEMENT = "ptm-walk.js"
 #: The service worker of sites that work without a network: its folder is what it serves.
 WORKER = "offline.js"
-#: The page of other forms, and their scripts (`ptmtools.site.forms`).
-FORM_PAGE, FORM_SCRIPTS = "form.html", ("apo.js", "interlace.js", "campus.js")
+#: The page of folders that are no databases (`ptmtools.site.forms`).
+FORM_PAGE = "form.html"
 #: Scripts and styles in the page; data blocks have a type and do not run.
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
@@ -52,33 +55,39 @@ _CHARSET = '<meta charset="utf-8">\n'
 _FIELD = re.compile(r"\{\{(\w+)\}\}")
 
 
+def attached_scripts() -> dict[str, Path]:
+    """The scripts of packages that attach to the walk, by their names; few visits need them."""
+    files = [kind.script for kind in representations()]
+    files += [emitter.site.script for emitter in EMITTERS.values() if emitter.site]
+    return {file.name: file for file in files}
+
+
 def program_files() -> dict[str, SiteEntry]:
-    """The scripts and the decoder, by their names in `PAGE`, in a folder named by their contents.
+    """The scripts and the decoder, by their names, in a folder named by their contents.
 
     Raises InputError: PTM-I122 one is missing.
     """
-    data = {name: _read_built(name) for name in PROGRAM}
-    digest = sha256(b"".join(data[name] for name in sorted(data)))[:DIGITS]
+    files = attached_scripts() | {name: PAGE / name for name in PROGRAM}
+    data = {name: read_built(files[name]) for name in sorted(files)}
+    folder = f"viewer-{sha256(b''.join(data.values()))[:DIGITS]}"
     return {
-        name: SiteEntry(f"viewer-{digest}/{name}", data[name], media, True, compressed=True)
-        for name, media in PROGRAM.items()
+        name: SiteEntry(
+            f"{folder}/{name}", content, PROGRAM.get(name, JAVASCRIPT), True, compressed=True
+        )
+        for name, content in data.items()
     }
 
 
-def script_file(name: str) -> bytes:
-    """The bytes of a script that is not among the files of a site; raises as `program_files`."""
-    return _read_built(name)
-
-
-def _read_built(name: str) -> bytes:
+def read_built(file: Path) -> bytes:
+    """The bytes of a built file; raises as `program_files`."""
     try:
-        return (PAGE / name).read_bytes()
+        return file.read_bytes()
     except OSError as fault:
         raise InputError(
             "PTM-I122",
             f"a file of the page cannot be read ({fault.strerror or fault})",
-            file=PAGE / name,
-            remedy="install ptmtools again",
+            file=file,
+            remedy="install ptmtools again, or the plug-in with this file",
         ) from None
 
 
@@ -127,14 +136,9 @@ def page(
     return _fill(INDEX, settings, script, links, fields)
 
 
-def element() -> SiteEntry:
-    """The script of ``<ptm-walk>``, for pages that embed the walk; its name never changes."""
-    return SiteEntry(ELEMENT, _read_built(ELEMENT), JAVASCRIPT, compressed=True)
-
-
-def worker() -> SiteEntry:
-    """The service worker; browsers look for a new one under the same name."""
-    return SiteEntry(WORKER, _read_built(WORKER), JAVASCRIPT, compressed=True)
+def fixed_script(name: str) -> SiteEntry:
+    """`ELEMENT` or `WORKER`, whose names never change."""
+    return SiteEntry(name, read_built(PAGE / name), JAVASCRIPT, compressed=True)
 
 
 def registration(program: Mapping[str, SiteEntry]) -> str:
@@ -143,12 +147,11 @@ def registration(program: Mapping[str, SiteEntry]) -> str:
     return f'<script>addEventListener("load", () => import("./{url}"))</script>'
 
 
-def form_script(name: str) -> SiteEntry:
-    """A script of `FORM_SCRIPTS`, in a folder named by its contents; raises as `program_files`."""
-    data = _read_built(name)
-    return SiteEntry(
-        f"viewer-{sha256(data)[:DIGITS]}/{name}", data, JAVASCRIPT, True, compressed=True
-    )
+def form_script(file: Path) -> SiteEntry:
+    """A script of a `FolderKind`, in a folder named by its contents; raises as `program_files`."""
+    data = read_built(file)
+    name = f"viewer-{sha256(data)[:DIGITS]}/{file.name}"
+    return SiteEntry(name, data, JAVASCRIPT, True, compressed=True)
 
 
 def form_page(
@@ -178,7 +181,7 @@ def _fill(
         "script": script,
         **fields,
     }
-    filled = _FIELD.sub(lambda match: values[match[1]], _read_built(template).decode())
+    filled = _FIELD.sub(lambda match: values[match[1]], read_built(PAGE / template).decode())
     return SiteEntry(INDEX, add_policy(filled, framed=framed).encode(), HTML, compressed=True)
 
 

@@ -36,7 +36,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.site.content import Site
 from ptmtools.site.entry import SiteEntry, link_bytes
 from ptmtools.site.files import DATA
-from ptmtools.site.program import INDEX, LATER
+from ptmtools.site.program import INDEX, LATER, attached_scripts
 from ptmtools.site.published import (
     LIST,
     Published,
@@ -228,10 +228,11 @@ def weight_of(site: Site) -> Weight:
         for number, row in enumerate(index["cells"])
         if row.get("standing", True)
     }
-    used = {kind.script for kind in representations_in(index)}
+    used = {kind.script.name for kind in representations_in(index)}
     used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
-    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, used)}
+    unused = {*LATER, *attached_scripts()} - used
+    bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, unused)}
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
     before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
@@ -247,10 +248,9 @@ def weight_of(site: Site) -> Weight:
     )
 
 
-def _is_walked(name: str, used: Collection[str]) -> bool:
-    """Whether every walk may need a file; of scripts that are loaded later those ``used``."""
-    script = name.rpartition("/")[2]
-    later = (script in LATER and script not in used) or is_other_form(name)
+def _is_walked(name: str, unused: Collection[str]) -> bool:
+    """Whether every walk may need a file, which is not one of the ``unused`` scripts."""
+    later = name.rpartition("/")[2] in unused or is_other_form(name)
     walked = name.startswith(("viewer-", f"{DATA}/")) and not name.startswith(_NOT_OF_WALK)
     return name == INDEX or (walked and not later)
 

@@ -4,6 +4,7 @@ database."""
 from ptmtools.folder_kinds import FolderDrawing, FolderKind
 from ptmtools.lazy import Lazy
 from ptmtools.output.representation import Representation
+from ptmtools_systems import PAGE
 from ptmtools_systems.schemas import APO
 
 APO_FOLDER = FolderKind(
@@ -13,7 +14,7 @@ APO_FOLDER = FolderKind(
     check=Lazy("ptmtools_systems.apo.checking:check_folder"),
     describe=Lazy("ptmtools_systems.apo.checking:describe"),
     schema=APO,
-    script="apo.js",
+    script=PAGE / "apo.js",
     files=Lazy("ptmtools_systems.apo.files:page_files"),
     drawing=FolderDrawing(
         Lazy("ptmtools_systems.apo.picture:RenderOptions"),
@@ -25,7 +26,7 @@ OCTREES = Representation(
     noun="octree texture",
     member="octree",
     folder="apo",
-    script="statues.js",
+    script=PAGE / "statues.js",
     check=Lazy("ptmtools_systems.apo.checking:check_octrees"),
     painter=Lazy("ptmtools_systems.apo.served_octrees:OctreePainter"),
     published=Lazy("ptmtools_systems.apo.served_octrees:published_rows"),

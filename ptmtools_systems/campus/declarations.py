@@ -2,6 +2,7 @@
 
 from ptmtools.folder_kinds import FolderKind
 from ptmtools.lazy import Lazy
+from ptmtools_systems import PAGE
 from ptmtools_systems.schemas import CAMPUS
 
 CAMPUS_FOLDER = FolderKind(
@@ -11,7 +12,7 @@ CAMPUS_FOLDER = FolderKind(
     check=Lazy("ptmtools_systems.campus.validation:check_campus"),
     describe=Lazy("ptmtools_systems.campus.reading:describe_campus"),
     schema=CAMPUS,
-    script="campus.js",
+    script=PAGE / "campus.js",
     files=Lazy("ptmtools_systems.campus.reading:page_files"),
     records=True,
 )

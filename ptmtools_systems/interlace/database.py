@@ -118,9 +118,9 @@ def set_entries(
 ) -> Iterator[SiteEntry]:
     """The files of the sets of all textures in a site, the document last.
 
-    Visitors with ``?form=gpuii`` walk among them (`web/page/sets.js`), and others download none of
-    them. One document has the manifests of all sets, so that a client orders files by the sizes of
-    all images after one request.
+    Visitors with ``?form=gpuii`` walk among them (`web/systems/sets.js`), and others download none
+    of them. One document has the manifests of all sets, so that a client orders files by the sizes
+    of all images after one request.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ of a database."""
 from ptmtools.folder_kinds import FolderKind
 from ptmtools.lazy import Lazy
 from ptmtools.output.emitter import Emitter, SiteTextures
+from ptmtools_systems import PAGE
 from ptmtools_systems.schemas import INTERLACE
 
 INTERLACE_FOLDER = FolderKind(
@@ -13,7 +14,7 @@ INTERLACE_FOLDER = FolderKind(
     check=Lazy("ptmtools_systems.interlace.reading:validate_interlaced"),
     describe=Lazy("ptmtools_systems.interlace.reading:describe"),
     schema=INTERLACE,
-    script="interlace.js",
+    script=PAGE / "interlace.js",
     files=Lazy("ptmtools_systems.interlace.reading:page_files"),
 )
 INTERLACED = Emitter(
@@ -24,5 +25,10 @@ INTERLACED = Emitter(
     reader=Lazy("ptmtools_systems.interlace.database:read_file"),
     check=Lazy("ptmtools_systems.interlace.database:check_files"),
     texture_files="interlace/{name}/",
-    site=SiteTextures("sets", "data/sets", Lazy("ptmtools_systems.interlace.database:set_entries")),
+    site=SiteTextures(
+        "sets",
+        "data/sets",
+        PAGE / "sets.js",
+        Lazy("ptmtools_systems.interlace.database:set_entries"),
+    ),
 )

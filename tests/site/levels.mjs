@@ -1,7 +1,7 @@
 // The order in which levels of one octree and of one texture are requested with `?octrees=best`, of each of the
 // cases: `[whether of the octree, levels that are there then]`. One request is under way at a time.
 
-import { weighLevels } from "../../web/page/octree/weighing.js";
+import { weighLevels } from "../../web/systems/octree/weighing.js";
 import { Best } from "../../web/page/policy/best.js";
 import { catalogueOf } from "../../web/page/policy/catalogue.js";
 import { Client } from "../../web/page/policy/client.js";

@@ -15,7 +15,8 @@ from benchmarks.npm import ESBUILD
 from benchmarks.page_weight import sent
 from ptmtools.errors import InputError
 from ptmtools.site import client, program
-from ptmtools.site.program import FORM_SCRIPTS, PAGE, PROGRAM, program_files
+from ptmtools.site.program import PAGE, PROGRAM, program_files
+from ptmtools_systems import PAGE as SYSTEMS_PAGE
 
 ROOT = Path(__file__).parents[2]
 BUILD = ROOT / "web" / "page" / "build.py"
@@ -56,8 +57,14 @@ def test_the_sources_give_the_page(require: Callable[[str, str], None], tmp_path
     if remedy := ESBUILD.remedy():
         require("esbuild", remedy)
     subprocess.run([sys.executable, BUILD, tmp_path], check=True)
-    built = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    committed = {file.name: file.read_bytes() for file in PAGE.iterdir()}
+    built, committed = (
+        {
+            f"{place}/{file.name}": file.read_bytes()
+            for place in ("ptmtools/site/page", "ptmtools_systems/page")
+            for file in (root / place).iterdir()
+        }
+        for root in (tmp_path, ROOT)
+    )
     assert built.keys() == committed.keys()
     changed = [name for name in built if built[name] != committed[name]]
     assert changed == [], "run: python web/page/build.py"
@@ -91,10 +98,9 @@ def test_the_constants_of_the_client() -> None:
 
 def test_scripts_import_nothing_at_once() -> None:
     """Each is one request: no other script is found only after it."""
-    for name in (*PROGRAM, *FORM_SCRIPTS):
-        if not name.endswith(".js"):
-            continue
-        script = (PAGE / name).read_text()
+    files = (PAGE / name for name in PROGRAM if name.endswith(".js"))
+    for file in (*files, *SYSTEMS_PAGE.iterdir()):
+        script = file.read_text()
         assert not re.search(r"""\bimport\s*["{*\w]""", script)
         assert not re.search(r"/\*\*|\n\s*//", script)
 

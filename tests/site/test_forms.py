@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -327,12 +328,26 @@ def test_every_form_has_a_page(statue: Path, pictures: dict[str, Path]) -> None:
         site = form_site(folder, form, SiteOptions("A <title>", address="https://example.org/x"))
         page = site.entries["index.html"].read().decode()
         assert "<title>A &lt;title&gt;</title>" in page
-        assert form.script in page
+        assert form.script.name in page
         assert '<link rel="canonical" href="https://example.org/x/">' in page
         assert "manifest.webmanifest" in site.entries
         (index,) = (e for n, e in site.entries.items() if n.endswith(name))
         assert index.forever
         assert all(is_marked(name) == entry.forever for name, entry in site.entries.items())
+
+
+def test_a_kind_brings_its_script(statue: Path, tmp_path: Path) -> None:
+    """From a file of its own package."""
+    script = tmp_path / "own.js"
+    kind = replace(folder_kinds()["apo.json"], script=script)
+    with pytest.raises(InputError, match="or the plug-in") as raised:
+        form_site(statue, kind)
+    assert (raised.value.code, raised.value.file) == ("PTM-I122", str(script))
+    script.write_text("export {};")
+    entries = form_site(statue, kind).entries
+    (name,) = (name for name in entries if name.endswith("/own.js"))
+    assert entries[name].read() == b"export {};"
+    assert f'src="{name}"' in entries["index.html"].read().decode()
 
 
 def test_a_published_folder(

@@ -7,6 +7,8 @@ import io
 import json
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,7 +27,7 @@ from ptmtools.site.content import Site, SiteOptions, site_of, title_of
 from ptmtools.site.conversion import lean_glb, web_texture
 from ptmtools.site.entry import is_marked, link_bytes
 from ptmtools.site.files import DATA
-from ptmtools.site.program import ELEMENT, LATER, PROGRAM
+from ptmtools.site.program import ELEMENT, LATER, PROGRAM, attached_scripts
 from ptmtools.site.publishing import weight_of
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
 
@@ -79,7 +81,7 @@ def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
             assert re.fullmatch(rf"data/[\w-]+-{digest[:10]}\.\w+", name)
     program = {name for name in site.entries if name.startswith("viewer-")}
     assert len({name.split("/")[0] for name in program}) == 1
-    assert {name.split("/")[1] for name in program} == set(PROGRAM)
+    assert {name.split("/")[1] for name in program} == {*PROGRAM, *attached_scripts()}
     again = site_of(two_rooms)
     assert {n: e.read() for n, e in again.entries.items()} == {
         n: e.read() for n, e in site.entries.items()
@@ -326,11 +328,37 @@ def test_textures_that_browsers_do_not_read(tmp_path: Path, kind: str, profile: 
     assert np.abs(coarsest + offset - actual.row["color"]).max() <= 1
 
 
+#: The product alone, as if the other packages were not installed.
+ALONE = """
+import sys
+from pathlib import Path
+from ptmtools import plugins
+
+points = plugins.points
+plugins.points = lambda kind: {
+    name: point for name, point in points(kind).items() if not point.value.startswith("ptmtools_")
+}
+sys.modules |= dict.fromkeys(("ptmtools_systems", "ptmtools_lab", "ptmtools_samples"))
+from ptmtools.site.content import SiteOptions, site_of
+
+site = site_of(Path(sys.argv[1]), SiteOptions(pictures=False))
+print(*sorted(name.split("/")[1] for name in site.entries if name.startswith("viewer-")))
+"""
+
+
+def test_the_product_alone(two_rooms: Path) -> None:
+    """It publishes a walk without the scripts of other packages."""
+    command = [sys.executable, "-c", ALONE, two_rooms]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == sorted(PROGRAM)
+
+
 def test_weight(site: Site) -> None:
     """Sums of what is on the disk."""
     weight = weight_of(site)
     sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
-    needed = [name for name in sizes if not name.endswith(tuple(f"/{each}" for each in LATER))]
+    later = tuple(f"/{name}" for name in (*LATER, *attached_scripts()))
+    needed = [name for name in sizes if not name.endswith(later)]
     needed = [n for n in needed if n not in (ELEMENT, MANIFEST) and not n.startswith("data/icon-")]
     assert weight.page == sum(sizes[name] for name in needed if not name.startswith("data/"))
     assert weight.whole == sum(sizes[name] for name in needed)

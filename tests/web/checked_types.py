@@ -14,7 +14,7 @@ from benchmarks.npm import TYPESCRIPT
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Folders with a tsconfig.json.
-PACKAGES = ("web/ptm", "web/client", "web/three-ptm", "web/page", "web/embed")
+PACKAGES = ("web/ptm", "web/client", "web/three-ptm", "web/page", "web/systems", "web/embed")
 #: For the second of `make lint` and `make test`, which takes half of the time of the first.
 CACHE = ROOT / "build/types"
 

@@ -1,8 +1,9 @@
 """Builds the page that ptmtools ships, in ``ptmtools/site/page``: the modules of the page and of
-the worker, bundled and minified by esbuild, the template with its style, and the decoder.
+the worker, bundled and minified by esbuild, the template with its style, and the decoder; and the
+scripts of ``web/systems`` that attach to it, in ``ptmtools_systems/page``.
 
-    python web/page/build.py            writes it
-    python web/page/build.py FOLDER     writes it elsewhere
+    python web/page/build.py            writes them
+    python web/page/build.py FOLDER     writes them to the same places below a folder
 
 The words of the page come from ``ptmtools/site/words``: the English ones as a module, of which each
 bundle takes the sections that it uses (``web/page/words/english.js``, written here), every other
@@ -29,18 +30,23 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.npm import ESBUILD  # noqa: E402
 
 PTM = ROOT / "web" / "ptm" / "src"
-#: The page of octree textures, interlaced images and campuses.
+#: The template of the page of folders that are no databases.
 FORMS = HERE / "forms"
+#: Octree textures, interlaced images and campuses: scripts of their pages, and those that draw them
+#: in a walk, which the page loads when it needs them.
+SYSTEMS = ROOT / "web" / "systems"
+FORM_SCRIPTS, ATTACHED = ("apo.js", "interlace.js", "campus.js"), ("statues.js", "sets.js")
 #: Words by language, and the module of the English ones.
 WORDS, ENGLISH = ROOT / "ptmtools" / "site" / "words", HERE / "words" / "english.js"
 #: Constants of the client, and their module.
 CLIENT = ROOT / "ptmtools" / "site" / "client.json"
 CONSTANTS = HERE / "policy" / "constants.js"
-OUTPUT = ROOT / "ptmtools" / "site" / "page"
+#: Folders of the scripts in the repository.
+PAGE, SYSTEMS_PAGE = "ptmtools/site/page", "ptmtools_systems/page"
 #: Scripts that the page loads when it needs them.
 LATER = (
-    *("later.js", "compare.js", "statues.js", "reliefs.js", "sets.js", "tour.js", "embedded.js"),
-    *("register.js", "gamepad.js", "xr.js"),
+    *("later.js", "compare.js", "reliefs.js", "tour.js", "embedded.js", "register.js"),
+    *("gamepad.js", "xr.js"),
 )
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _WORD = re.compile(r"\[\[(\w+)\]\]")
@@ -53,7 +59,7 @@ _SHADER_REMARK = re.compile(r"\s*//[^\n]*")
 def bundled(folder: Path, source: list[str], text: str = "") -> bytes:
     """What esbuild makes of a file of a folder, or of a text; CalledProcessError if it fails."""
     options = ["--bundle", "--minify", "--format=esm", "--target=es2022", "--charset=utf8"]
-    options += [f"--external:./{name}" for name in LATER]
+    options += [f"--external:./{name}" for name in (*LATER, *ATTACHED)]
     command = [ESBUILD.folder / "bin/esbuild", *source, *options, "--log-level=warning"]
     done = subprocess.run(
         command, cwd=folder, input=text.encode(), stdout=subprocess.PIPE, check=True
@@ -127,16 +133,11 @@ def page(folder: Path) -> bytes:
     return template.replace("{{style}}", style).encode()
 
 
-def build(folder: Path) -> None:
-    """Writes the page to a folder. SystemExit without esbuild."""
-    ESBUILD.require()
-    if folder == OUTPUT:
-        ENGLISH.write_text(english(), encoding="utf-8")
-        CONSTANTS.write_text(constants(), encoding="utf-8")
-    files = {
+def page_files() -> dict[str, bytes]:
+    """The files of the page."""
+    return {
         "index.html": page(HERE),
         "form.html": page(FORMS),
-        **{f"{name}.js": script(FORMS / f"{name}.js") for name in ("apo", "interlace", "campus")},
         "viewer.js": script(HERE / "main.js"),
         **{name: script(HERE / name) for name in LATER},
         **{
@@ -151,10 +152,27 @@ def build(folder: Path) -> None:
         "worker.js": minified(PTM / "worker.js"),
         "decoder.wasm": (PTM / "decoder.wasm").read_bytes(),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, data in files.items():
-        (folder / name).write_bytes(data)
+
+
+def systems_files() -> dict[str, bytes]:
+    """The scripts of the other systems."""
+    return {
+        **{name: script(SYSTEMS / "forms" / name) for name in FORM_SCRIPTS},
+        **{name: script(SYSTEMS / name) for name in ATTACHED},
+    }
+
+
+def build(root: Path) -> None:
+    """Writes all files to their places below a folder. SystemExit without esbuild."""
+    ESBUILD.require()
+    if root == ROOT:
+        ENGLISH.write_text(english(), encoding="utf-8")
+        CONSTANTS.write_text(constants(), encoding="utf-8")
+    for place, files in ((PAGE, page_files()), (SYSTEMS_PAGE, systems_files())):
+        (root / place).mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            (root / place / name).write_bytes(data)
 
 
 if __name__ == "__main__":
-    build(Path(sys.argv[1]) if len(sys.argv) > 1 else OUTPUT)
+    build(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT)

@@ -63,7 +63,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {TextureRow[]} textures
  * @property {CellRow[]} cells
  * @property {{cell: number, box: number[], errors: number[], files: string[], bytes: number[]}[]} [meshes]
- * @property {import("../octree/statues.js").OctreeRow[]} [octrees]
+ * @property {import("../../systems/octree/statues.js").OctreeRow[]} [octrees]
  * @property {string} [sets] the document of interlaced images
  *
  * @typedef {object} Leaf

@@ -39,7 +39,7 @@ export class Renderer {
     /** Whether the light is baked: in lightmaps or at vertices. */
     this.baked = rows.some((row) => "light" in row);
     /** Draws what has relief, if the site has any.
-     * @type {Pick<import("../octree/statues.js").Statues, "delete" | "has" | "lacks" | "levels" | "advance">
+     * @type {Pick<import("../../systems/octree/statues.js").Statues, "delete" | "has" | "lacks" | "levels" | "advance">
      *   & Pick<import("../relief/reliefs.js").Reliefs, "draw"> & {bytes?: number} | null} */
     this.statues = null;
   }

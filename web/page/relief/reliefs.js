@@ -8,7 +8,7 @@ import { encoded, lookOf } from "../gl/cell-buffers.js";
 import { aim, programOf } from "../gl/program.js";
 import { corners, SOURCES, TEXEL } from "../gl/shaders.js";
 import { PageError } from "../net/errors.js";
-import { LIT } from "../octree/lamp.js";
+import { LIT } from "./lamp.js";
 import { distance } from "../space/frustum.js";
 import { weigh } from "./weight.js";
 import { objects } from "../words/english.js";

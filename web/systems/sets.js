@@ -5,18 +5,18 @@ import { Gpuii } from "./sets/gpuii.js";
 import { JoinedMemory } from "./sets/joined-memory.js";
 import { piecesOf } from "./sets/pieces.js";
 import { rowOf, setsIn } from "./sets/sets.js";
-import { showNotice } from "./ui/errors.js";
-import { objects } from "./words/english.js";
+import { showNotice } from "../page/ui/errors.js";
+import { objects } from "../page/words/english.js";
 
 /** @typedef {import("./sets/sets.js").TextureSet} TextureSet */
 
 /**
  * Puts steps of interlaced images in place of the levels of a site's textures. Returns a function that prepares the
  * walk for them, or null, after a notice, if the site has none. Rejects with a PageError if they are damaged.
- * @param {import("./data/site.js").Site} site
+ * @param {import("../page/data/site.js").Site} site
  * @param {WebGL2RenderingContext} gl
  * @param {{opening: unknown}} options of the application: an opening has levels of textures
- * @param {import("./net/fetcher.js").Fetcher} fetcher
+ * @param {import("../page/net/fetcher.js").Fetcher} fetcher
  */
 export async function setsOf(site, gl, options, fetcher) {
   const { index } = site;
@@ -29,10 +29,10 @@ export async function setsOf(site, gl, options, fetcher) {
     setsIn(JSON.parse(new TextDecoder().decode(body)), index.textures, urlOf, gl));
   options.opening = null;
   site.index = { ...index, textures: index.textures.map((row, t) => rowOf(row, sets[t])) };
-  return (/** @type {import("./walkthrough.js").Walkthrough} */ walk) => attach(walk, sets);
+  return (/** @type {import("../page/walkthrough.js").Walkthrough} */ walk) => attach(walk, sets);
 }
 
-/** @param {import("./walkthrough.js").Walkthrough} walk @param {TextureSet[]} sets */
+/** @param {import("../page/walkthrough.js").Walkthrough} walk @param {TextureSet[]} sets */
 function attach(walk, sets) {
   const { client, client: { catalogue }, gl, picture, rows } = walk, { K, T, memory } = catalogue;
   const normals = walk.index.textures.map((row) => row.normals === true);
@@ -48,7 +48,7 @@ function attach(walk, sets) {
   /** @type {Map<number, import("./sets/pieces.js").Piece[]>} */
   const pieces = new Map(), learn = client.learnGeometry.bind(client);
   client.learnGeometry = (cell, shapes) => {
-    pieces.set(cell, /** @type {import("./data/glb.js").Shape[]} */ (shapes).flatMap((shape) => [
+    pieces.set(cell, /** @type {import("../page/data/glb.js").Shape[]} */ (shapes).flatMap((shape) => [
       ...(shape.uvs ? piecesOf(shape, shape.texture, shape.uvs) : []),
       ...(shape.spots ? piecesOf(shape, shape.light, shape.spots) : []),
       ...(shape.frames && normals[shape.relief] ? piecesOf(shape, shape.relief, shape.frames[0]) : []),
@@ -63,7 +63,7 @@ function attach(walk, sets) {
   walk.choose = walk.compare = () => walk.emit("notice", { message: objects.fixed });
 }
 
-/** The requests of steps become requests of files. @param {import("./walkthrough.js").Walkthrough} walk
+/** The requests of steps become requests of files. @param {import("../page/walkthrough.js").Walkthrough} walk
  * @param {TextureSet[]} sets */
 function fetchFiles({ client, stream, stream: { fetcher } }, sets) {
   const { bytes } = client.downloads, url = stream.url.bind(stream), range = fetcher.range.bind(fetcher);

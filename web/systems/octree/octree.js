@@ -1,11 +1,11 @@
 // An octree texture that comes by levels: its stream, and its texels on the graphics card
 // (docs/formats/apo.md; Lacoste et al., sections 4.1 and 4.2).
 
-import { PageError } from "../net/errors.js";
-import { clock } from "../net/fetcher.js";
+import { PageError } from "../../page/net/errors.js";
+import { clock } from "../../page/net/fetcher.js";
 import { checksum } from "./checksum.js";
-import { objects } from "../words/english.js";
-import { fill } from "../words/language.js";
+import { objects } from "../../page/words/english.js";
+import { fill } from "../../page/words/language.js";
 
 /** Texels in a row of the texture, and the most in all. */
 export const WIDTH = 4096, MOST = 2 ** 24;
@@ -122,7 +122,7 @@ export class Octree {
    * @param {WebGL2RenderingContext} gl
    * @param {OctreeIndex} index
    * @param {(file: string) => string} urlOf
-   * @param {import("../net/fetcher.js").Fetcher} fetcher
+   * @param {import("../../page/net/fetcher.js").Fetcher} fetcher
    * @param {number} step seconds between updates; 0 updates when a level is complete
    */
   constructor(gl, index, urlOf, fetcher, step) {

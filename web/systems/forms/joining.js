@@ -1,11 +1,11 @@
 // Joins the files of an interlaced image on the graphics card, step by step, by drawing alternately into
 // two textures (docs/formats/interlace.md; Englert et al., section 3.2).
 
-import { programOf } from "../gl/program.js";
-import { PageError } from "../net/errors.js";
+import { programOf } from "../../page/gl/program.js";
+import { PageError } from "../../page/net/errors.js";
 import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";
-import { objects } from "../words/english.js";
+import { objects } from "../../page/words/english.js";
 
 const MEDIA = /** @type {Record<string, string>} */ ({ png: "image/png", jpg: "image/jpeg", webp: "image/webp" });
 const WIDEST = 1 << 16;
@@ -223,7 +223,7 @@ export function mostSteps(gl, { files }) {
 
 export class Joining {
   /** @param {WebGL2RenderingContext} gl @param {SetIndex} index
-   * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
+   * @param {(file: string) => string} urlOf @param {import("../../page/net/fetcher.js").Fetcher} fetcher */
   constructor(gl, index, urlOf, fetcher) {
     this.index = index;
     this.urlOf = urlOf;

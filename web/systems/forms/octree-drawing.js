@@ -1,7 +1,7 @@
 // Draws a simplified mesh with the normals of its octree: the traversal in the fragment shader
 // (docs/formats/apo.md, "Looking a normal up"; Lacoste et al., section 3.2), lit as by `ptm render`.
 
-import { programOf } from "../gl/program.js";
+import { programOf } from "../../page/gl/program.js";
 import { LOOK_UP } from "../octree/look-up.js";
 import { checksum } from "../octree/checksum.js";
 import { demand, isWhole } from "../octree/octree.js";

@@ -4,14 +4,14 @@
 // eye; and it is of the lowest step there. Normal maps of materials come after all colours. Texture memory is
 // filled with steps in the same order, and the rest of it with the others that are here, the last seen first.
 
-import { RING } from "../policy/constants.js";
-import { lacking, modelled } from "../policy/files.js";
-import { distance, meetsBox } from "../space/frustum.js";
+import { RING } from "../../page/policy/constants.js";
+import { lacking, modelled } from "../../page/policy/files.js";
+import { distance, meetsBox } from "../../page/space/frustum.js";
 
-/** @typedef {import("../policy/client.js").Client} Client */
-/** @typedef {import("../policy/client.js").Policy} Policy */
-/** @typedef {import("../policy/downloads.js").Kind} Kind */
-/** @typedef {import("../policy/estimate.js").Belief} Belief */
+/** @typedef {import("../../page/policy/client.js").Client} Client */
+/** @typedef {import("../../page/policy/client.js").Policy} Policy */
+/** @typedef {import("../../page/policy/downloads.js").Kind} Kind */
+/** @typedef {import("../../page/policy/estimate.js").Belief} Belief */
 /** @typedef {import("./sets.js").TextureSet} TextureSet */
 /** @typedef {import("./pieces.js").Piece} Piece */
 

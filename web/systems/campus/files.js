@@ -1,6 +1,6 @@
 // The meshes and textures of a campus: downloaded and kept in main memory, on the graphics card while shown.
 
-import { openGlb } from "../data/glb.js";
+import { openGlb } from "../../page/data/glb.js";
 import { checksum } from "../octree/checksum.js";
 import { demand } from "../octree/octree.js";
 
@@ -128,7 +128,7 @@ export class CampusFiles {
   changes = 0;
 
   /** @param {WebGL2RenderingContext} gl @param {import("./index.js").CampusIndex} index
-   * @param {(file: string) => string} urlOf @param {import("../net/fetcher.js").Fetcher} fetcher */
+   * @param {(file: string) => string} urlOf @param {import("../../page/net/fetcher.js").Fetcher} fetcher */
   constructor(gl, index, urlOf, fetcher) {
     this.gl = gl;
     this.index = index;

@@ -9,17 +9,17 @@ import { CampusFiles } from "../campus/files.js";
 import { CampusIndex, LEAST } from "../campus/index.js";
 import { Labels } from "../campus/labels.js";
 import { Records } from "../campus/records.js";
-import { cameraOf } from "../gl/camera.js";
-import { directionOf, frustumOf, meetsBox } from "../space/frustum.js";
-import { attachControls } from "../ui/controls.js";
-import { find, inBytes, make } from "../ui/elements.js";
-import { showNotice } from "../ui/errors.js";
-import { fragmentOf, poseOf } from "../ui/address.js";
-import { Solids } from "../walk/solids.js";
-import { Walker } from "../walk/walker.js";
-import { indexOf, runForm } from "./form.js";
-import { form } from "../words/english.js";
-import { fill } from "../words/language.js";
+import { cameraOf } from "../../page/gl/camera.js";
+import { directionOf, frustumOf, meetsBox } from "../../page/space/frustum.js";
+import { attachControls } from "../../page/ui/controls.js";
+import { find, inBytes, make } from "../../page/ui/elements.js";
+import { showNotice } from "../../page/ui/errors.js";
+import { fragmentOf, poseOf } from "../../page/ui/address.js";
+import { Solids } from "../../page/walk/solids.js";
+import { Walker } from "../../page/walk/walker.js";
+import { indexOf, runForm } from "../../page/forms/form.js";
+import { form } from "../../page/words/english.js";
+import { fill } from "../../page/words/language.js";
 
 /** Vertical field of view, radians; radius, height of the eye and highest step of the visitor, m. */
 const ANGLE = Math.PI / 3, BODY = [0.25, 1.6, 0.5];

@@ -6,13 +6,13 @@
 //     #azimuth,elevation,distance  degrees, degrees, diameters
 
 import { checkOctree, demand, isWhole, Octree } from "../octree/octree.js";
-import { find, inBytes } from "../ui/elements.js";
-import { showNotice } from "../ui/errors.js";
-import { indexOf, runForm } from "./form.js";
+import { find, inBytes } from "../../page/ui/elements.js";
+import { showNotice } from "../../page/ui/errors.js";
+import { indexOf, runForm } from "../../page/forms/form.js";
 import { meshOf, OctreeDrawing } from "./octree-drawing.js";
 import { ANGLE, Orbit } from "./orbit.js";
-import { form } from "../words/english.js";
-import { fill } from "../words/language.js";
+import { form } from "../../page/words/english.js";
+import { fill } from "../../page/words/language.js";
 
 /** What the page needs of `apo.json`, checked. @param {any} index */
 function checkedIndex(index) {
@@ -42,7 +42,7 @@ runForm(async (gl, config, fetcher, fail) => {
   const total = index.streams.reduce((sum, { ends }) => sum + (ends.at(-1) ?? 0), 0);
   let paused = false, drawn = "", shown = 0;
   // What is there stays when a finer level cannot be fetched.
-  const report = (/** @type {import("../net/errors.js").PageError} */ fault) =>
+  const report = (/** @type {import("../../page/net/errors.js").PageError} */ fault) =>
     octree.levels ? showNotice(document, fault.message) : fail(fault);
   find(document, "#keys").textContent = form.orbit;
   return {

@@ -1,8 +1,8 @@
 // Draws a campus: the shader of a material follows from the channels that exist (docs/formats/campus.md,
 // "Drawing").
 
-import { aim, programOf } from "../gl/program.js";
-import { corners } from "../gl/shaders.js";
+import { aim, programOf } from "../../page/gl/program.js";
+import { corners } from "../../page/gl/shaders.js";
 import { textureFile } from "./index.js";
 
 /** The sky. */
@@ -42,7 +42,7 @@ const linear = (value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) /
  *   mesh, the texture of its light, and its distance */
 
 export class CampusDrawing {
-  /** By their channels. @type {Map<string, import("../gl/program.js").Program>} */
+  /** By their channels. @type {Map<string, import("../../page/gl/program.js").Program>} */
   #programs = new Map();
   /** By their wrap modes. @type {Map<string, WebGLSampler>} */
   #samplers = new Map();
@@ -57,7 +57,7 @@ export class CampusDrawing {
   }
 
   /**
-   * @param {import("../gl/camera.js").Camera} camera
+   * @param {import("../../page/gl/camera.js").Camera} camera
    * @param {Shown[]} shown
    * @param {(base: string, channel: string) => string | null} textureOf the file in use, if any
    */
@@ -82,7 +82,7 @@ export class CampusDrawing {
     gl.bindVertexArray(null);
   }
 
-  /** @param {import("../gl/camera.js").Camera} camera
+  /** @param {import("../../page/gl/camera.js").Camera} camera
    * @param {Shown & {part: import("./files.js").Part, array: WebGLVertexArrayObject, count: number, type: number}} one
    * @param {(base: string, channel: string) => string | null} textureOf */
   #part(camera, { part, array, count, type, lightmap }, textureOf) {

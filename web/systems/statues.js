@@ -5,7 +5,7 @@ import { weighLevels } from "./octree/weighing.js";
 
 /**
  * Lets the renderer draw them.
- * @param {import("./walkthrough.js").Walkthrough} walk
+ * @param {import("../page/walkthrough.js").Walkthrough} walk
  */
 export function show(walk) {
   const { gl, index, picture, stream: { site, fetcher } } = walk;

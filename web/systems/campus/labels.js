@@ -1,6 +1,6 @@
 // Points of interest: names over the objects in view, larger when near, and a menu of all of them.
 
-import { find, make } from "../ui/elements.js";
+import { find, make } from "../../page/ui/elements.js";
 import { iconOf } from "./icons.js";
 
 /** Names in view at a time, and the farthest, m. */
@@ -79,7 +79,7 @@ export class Labels {
 
   /**
    * Places the names of a frame.
-   * @param {import("../gl/camera.js").Camera} camera
+   * @param {import("../../page/gl/camera.js").Camera} camera
    * @param {number} width of the canvas on the screen @param {number} height
    */
   place({ eye, turn, lens }, width, height) {

@@ -1,7 +1,7 @@
 // The client of a campus (docs/formats/campus.md, "A client"): which files come next, and in which detail
 // each object is shown. It decides as `ptmtools_lab.campus.client` does.
 
-import { CAMPUS_MOVE, CAMPUS_NEAREST, CAMPUS_THREADS } from "../policy/constants.js";
+import { CAMPUS_MOVE, CAMPUS_NEAREST, CAMPUS_THREADS } from "../../page/policy/constants.js";
 
 /** @typedef {import("./index.js").CampusIndex} CampusIndex */
 /** @typedef {import("./index.js").Preset} Preset */

@@ -5,7 +5,7 @@ import { demand } from "../octree/octree.js";
 
 /** @typedef {import("../forms/joining.js").Picture} Picture */
 /** @typedef {import("../forms/joining.js").SetIndex} SetIndex */
-/** @typedef {import("../data/site.js").TextureRow} TextureRow */
+/** @typedef {import("../../page/data/site.js").TextureRow} TextureRow */
 
 /** Texels of an image and its mip levels. @param {{width: number, height: number}} size */
 function withMips({ width, height }) {

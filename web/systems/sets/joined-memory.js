@@ -5,7 +5,7 @@
 
 import { Joiner } from "../forms/joining.js";
 
-/** @typedef {import("../gl/renderer.js").Textures} Textures */
+/** @typedef {import("../../page/gl/renderer.js").Textures} Textures */
 /** @typedef {import("../forms/joining.js").Picture} Picture */
 /** @typedef {import("./sets.js").TextureSet} TextureSet */
 

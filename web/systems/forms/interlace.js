@@ -2,13 +2,13 @@
 //
 //     ?all    joins all files, whatever the view needs
 
-import { programOf } from "../gl/program.js";
-import { find, inBytes } from "../ui/elements.js";
-import { indexOf, runForm } from "./form.js";
+import { programOf } from "../../page/gl/program.js";
+import { find, inBytes } from "../../page/ui/elements.js";
+import { indexOf, runForm } from "../../page/forms/form.js";
 import { checkedSet, Joining } from "./joining.js";
 import { Panning } from "./panning.js";
-import { form } from "../words/english.js";
-import { fill } from "../words/language.js";
+import { form } from "../../page/words/english.js";
+import { fill } from "../../page/words/language.js";
 
 const VERTEX = `#version 300 es
 uniform vec4 box;

@@ -1,9 +1,9 @@
 // The levels of octrees among the requests of the policy `best`, with `?octrees=best`: the greatest worth for its
 // bytes comes first, as with `best+apo` in simulations. Shares of the view are those of the boxes in it.
 
-import { bestStep } from "../policy/allocation.js";
-import { overheadOf, room } from "../policy/best.js";
-import { LEAST_DIFFERENCE } from "../policy/constants.js";
+import { bestStep } from "../../page/policy/allocation.js";
+import { overheadOf, room } from "../../page/policy/best.js";
+import { LEAST_DIFFERENCE } from "../../page/policy/constants.js";
 
 /** @typedef {import("./statues.js").Statues} Statues */
 
@@ -30,13 +30,13 @@ export function bestLevels(wanted, rows, overhead) {
 
 /**
  * Lets levels take the place of requests that are worth less.
- * @param {import("../walkthrough.js").Walkthrough} walk
+ * @param {import("../../page/walkthrough.js").Walkthrough} walk
  * @param {Statues} statues
  */
 export function weighLevels(walk, statues) {
   const { client, client: { catalogue: { K, ends }, downloads }, index: { octrees = [] }, stream } = walk;
   const { next } = Object.getPrototypeOf(client);
-  /** Beyond the budget of texture memory. @param {import("../policy/downloads.js").Request} request */
+  /** Beyond the budget of texture memory. @param {import("../../page/policy/downloads.js").Request} request */
   const beyond = ({ kind, number, begin }) => kind === "texture"
     && begin >= ends[number * K + Math.max(client.target[number], client.column[number])];
   // Where the policy makes no more requests, levels come as without the option.

@@ -3,10 +3,10 @@
 // Its policy, which comes before it, allows no requests either: images are in data URLs. Plain text would lose
 // what records are for, headings, tables and pictures; a list of allowed tags would have to be right about each.
 
-import { make } from "../ui/elements.js";
-import { showNotice } from "../ui/errors.js";
+import { make } from "../../page/ui/elements.js";
+import { showNotice } from "../../page/ui/errors.js";
 import { nameOf } from "./labels.js";
-import { form } from "../words/english.js";
+import { form } from "../../page/words/english.js";
 
 const POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; font-src data:";
 const HEAD = `<!doctype html><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="${POLICY}">

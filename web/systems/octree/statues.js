@@ -1,16 +1,16 @@
 // Objects with octree textures, in the rooms of a walk: a script of its own, which sites with such objects
 // load. They are lit by a lamp, as `ptm simulate --lit` lights them; without levels they look as others.
 
-import { clock } from "../net/fetcher.js";
-import { PageError } from "../net/errors.js";
-import { aim, programOf } from "../gl/program.js";
-import { corners, TEXEL } from "../gl/shaders.js";
-import { distance } from "../space/frustum.js";
-import { LIT } from "./lamp.js";
+import { clock } from "../../page/net/fetcher.js";
+import { PageError } from "../../page/net/errors.js";
+import { aim, programOf } from "../../page/gl/program.js";
+import { corners, TEXEL } from "../../page/gl/shaders.js";
+import { distance } from "../../page/space/frustum.js";
+import { LIT } from "../../page/relief/lamp.js";
 import { LOOK_UP } from "./look-up.js";
 import { checkOctree, Octree, followingOf } from "./octree.js";
-import { objects } from "../words/english.js";
-import { fill } from "../words/language.js";
+import { objects } from "../../page/words/english.js";
+import { fill } from "../../page/words/language.js";
 
 /** Bytes of octrees on the graphics card, at most. */
 const MOST = 128 << 20;
@@ -44,7 +44,7 @@ void main() {
   shown.a = 1.0;
 }`;
 
-/** @typedef {import("../gl/renderer.js").Drawn} Drawn */
+/** @typedef {import("../../page/gl/renderer.js").Drawn} Drawn */
 /** @typedef {{file: string, cube: {low: number[], side: number}, levels: number[], ends: number[],
  *   crc32: number[], differences?: number[]}} OctreeRow */
 
@@ -64,8 +64,8 @@ export class Statues {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {OctreeRow[]} rows of the index; objects of wrong ones look like others
-   * @param {import("../data/site.js").Site} site
-   * @param {import("../net/fetcher.js").Fetcher} fetcher
+   * @param {import("../../page/data/site.js").Site} site
+   * @param {import("../../page/net/fetcher.js").Fetcher} fetcher
    * @param {(fault: PageError) => void} report
    * @param {() => void} touch called when the picture changes
    */
@@ -93,7 +93,7 @@ export class Statues {
     this.#octrees = [];
   }
 
-  /** Whether the octree of a look has levels to show. @param {import("../data/glb.js").Shape} look */
+  /** Whether the octree of a look has levels to show. @param {import("../../page/data/glb.js").Shape} look */
   has({ octree }) {
     return (this.#octrees[octree]?.levels ?? 0) > 0;
   }
@@ -217,10 +217,10 @@ export class Statues {
 
   /**
    * Draws batches into the bound framebuffer; true as long as a level of a texture fades in.
-   * @param {import("../gl/camera.js").Camera} camera
-   * @param {{buffers: import("../gl/cell-buffers.js").CellBuffers,
-   *   batch: import("../gl/cell-buffers.js").Batch}[]} batches
-   * @param {(at: Record<string, WebGLUniformLocation | null>, batch: import("../gl/cell-buffers.js").Batch)
+   * @param {import("../../page/gl/camera.js").Camera} camera
+   * @param {{buffers: import("../../page/gl/cell-buffers.js").CellBuffers,
+   *   batch: import("../../page/gl/cell-buffers.js").Batch}[]} batches
+   * @param {(at: Record<string, WebGLUniformLocation | null>, batch: import("../../page/gl/cell-buffers.js").Batch)
    *   => boolean} paint sets the uniforms of a batch's look
    */
   draw(camera, batches, paint) {
