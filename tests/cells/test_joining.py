@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -19,6 +20,7 @@ from ptmtools.cells.planar import triangulate_rings
 from ptmtools.cells.search import first_alike, weld
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Material, Scene
+from tests.builds import once
 
 #: So many open edges are compared with the model's at a time.
 CHUNK = 64
@@ -85,6 +87,7 @@ def halls(quads: Callable[..., Scene], room_faces: Any, partition: Any, **look: 
 def given(
     request: pytest.FixtureRequest,
     monkeypatch: pytest.MonkeyPatch,
+    tmp_path_factory: pytest.TempPathFactory,
     shared: Path,
     quads: Any,
     room_faces: Any,
@@ -96,7 +99,13 @@ def given(
     file = shared / "scenes/hospital/hospital.obj"
     if not file.is_file():
         pytest.skip(f"there is no {file}")
-    return taken_apart(monkeypatch, ingest(file))
+
+    def divide(folder: Path) -> None:
+        parts = taken_apart(monkeypatch, ingest(file))
+        (folder / "parts").write_bytes(pickle.dumps(parts))
+
+    parts = once(tmp_path_factory, "hospital_pieces", divide) / "parts"
+    return tuple(pickle.loads(parts.read_bytes()))
 
 
 def test_joined_pieces(given: tuple[Any, ...]) -> None:
