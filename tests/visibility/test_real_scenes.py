@@ -15,7 +15,7 @@ import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
 from ptmtools.scene import ingest
-from ptmtools.visibility import Pvs, check_conservative, compute_pvs
+from ptmtools.visibility import Pvs, PvsOptions, check_conservative, compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
 SEGMENTS = 100_000
@@ -59,12 +59,13 @@ def test_nothing_visible_is_missed_and_without_a_portal_it_is(
 
 
 def without_the_costliest_portal(cells: Cells, pvs: Pvs) -> Pvs:
-    """The PVS without that one of the ten largest portals that costs it most."""
+    """The PVS without that one of the ten largest portals that costs a fast PVS most."""
     largest = np.argsort(-cells.portal_area, kind="stable")[:10]
-    poorer = [compute_pvs(without_portal(cells, int(k))) for k in largest]
-    least = min(poorer, key=lambda p: len(p.cell))
-    assert len(least.cell) < len(pvs.cell)
-    return least
+    candidates = [without_portal(cells, int(k)) for k in largest]
+    sizes = [len(compute_pvs(some, PvsOptions(method="fast")).cell) for some in candidates]
+    poorer = compute_pvs(candidates[int(np.argmin(sizes))])
+    assert len(poorer.cell) < len(pvs.cell)
+    return poorer
 
 
 def without_portal(cells: Cells, k: int) -> Cells:
