@@ -42,12 +42,12 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (66_240, 331),
+    "ptmtools": (66_490, 331),
     "ptmtools/*.py": (4_130, 26),
     "ptmtools/cells": (8_040, 28),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
-    "ptmtools/light": (2_080, 10),
+    "ptmtools/light": (2_370, 12),
     "ptmtools/meshopt": (870, 5),
     "ptmtools/output": (7_760, 39),
     "ptmtools/pipeline": (3_680, 19),

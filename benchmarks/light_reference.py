@@ -3,13 +3,10 @@
     python benchmarks/light_reference.py [lit-hall museum hospital FILE …] [--views 6] [--noise 2]
         [--width 320] [--height 180] [--light none auto] [--out FOLDER]
 
-Mitsuba 3 traces the reference with all bounces, from the model's own file: geometry, textures and
-base colours as `ptmtools.scene` reads them, with the normals of smooth surfaces; metallic,
-roughness, emission and lamps of a GLB from its JSON, in colour. A model without lamps has a cloudy
-sky of `SKY` nits outside and ceilings that glow (`CEILING`); one with a sun has a sky of a fifth of
-its lux. Panes let light pass but for their opacity. Each view is traced in passes, and Open Image
-Denoise removes grain, until the standard error of the displayed picture is at most ``--noise`` of
-255, or there are as many passes as `_PASSES` allows.
+Mitsuba 3 traces the reference with all bounces, from the model's own file (`lit_model`). Panes let
+light pass but for their opacity. Each view is traced in passes, and Open Image Denoise removes
+grain, until the standard error of the displayed picture is at most ``--noise`` of 255, or there are
+as many passes as `_PASSES` allows.
 
 Exposure takes the mean of the reference's log luminance to `KEY`; then come the curve Khronos PBR
 Neutral and sRGB. Pictures of ``ptm render`` are compared as they are. *matt* is the same reference
@@ -33,21 +30,18 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from io import BytesIO
+from hashlib import sha256
 from pathlib import Path
 from time import process_time
 from typing import Any
 
 import numpy as np
+from lit_model import CEILING, SKY, WARM, LitModel, PathLamp, from_srgb
 from numpy.typing import NDArray
 from PIL import Image
-from ptmtools_samples.lit_hall import corner_normals
 from scenes import ROOT, model_file
 
-from ptmtools.arrays import Floats
-from ptmtools.glb import glb_chunks
-from ptmtools.scene import Scene, ingest
+from ptmtools.arrays import Floats, Singles
 from ptmtools.scene.model import Material
 from ptmtools_lab.measures import flip
 
@@ -66,15 +60,13 @@ LIT_HALL = (
     ((6.0, 1.7, 0.0), (13.0, 1.5, -1.0)),
     ((-4.5, 1.6, -3.0), (-2.7, 1.5, -1.4)),
 )
-#: Nits of a cloudy sky and its colour, and of ceilings; of the key, a share of white.
-SKY, BLUE, CEILING, WARM, KEY = 1.0, (0.85, 1.0, 1.25), 0.06, (1.2, 1.0, 0.8), 0.3
-#: A ceiling faces down, this far above the model's floor, metres.
-_OVER = 2.2
-#: Largest reflectance: with more, light hardly fades.
-_MOST = 0.98
 #: Bounces; paths of a pixel in a pass; least and most passes.
 _DEPTH, _PATHS, _PASSES = 12, 16, (4, 32)
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+#: Rows of the environment above the horizon.
+_ENVIRONMENT = 32
+#: The mean of log luminance that exposure aims at, a share of white.
+KEY = 0.3
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
@@ -84,23 +76,6 @@ class EyeView:
     eye: tuple[float, ...]
     look: tuple[float, ...]
     field: float = 60.0
-
-
-@dataclass(frozen=True)
-class PathLamp:
-    """A lamp as the file has it: linear colour × candela, or × lux of a sun; world coordinates."""
-
-    kind: str
-    color: Floats
-    place: Floats
-    way: Floats
-    cone: tuple[float, float]
-
-
-def from_srgb(encoded: Floats) -> Floats:
-    """Linear light of sRGB values in [0, 1]."""
-    low = encoded / 12.92
-    return np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(light: Floats) -> Floats:
@@ -128,53 +103,23 @@ def displayed(light: Floats, exposure: float) -> Floats:
 
 def exposure_of(light: Floats) -> float:
     """The factor that takes the mean of the log luminance to `KEY`; extremes do not count."""
-    luminance = light @ _LUMINANCE
+    luminance = light @ LUMINANCE
     low, high = np.quantile(luminance, (0.02, 0.98))
     return float(KEY / np.exp(np.log(np.clip(luminance, max(low, 1e-6), max(high, 1e-6))).mean()))
-
-
-def gltf_of(model: Path) -> dict[str, Any]:
-    """The JSON of a GLB; empty for other formats."""
-    return dict(json.loads(glb_chunks(model.read_bytes())[0][2])) if model.suffix == ".glb" else {}
-
-
-def path_lamps(tree: dict[str, Any], scene: Scene) -> list[PathLamp]:
-    """The lamps of a GLB in nodes without parents."""
-    name = "KHR_lights_punctual"
-    entries = tree.get("extensions", {}).get(name, {}).get("lights", [])
-    lamps = []
-    for node in tree.get("nodes", []):
-        index = node.get("extensions", {}).get(name, {}).get("light")
-        if index is None:
-            continue
-        entry = entries[index]
-        x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-        way = -np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-        place = np.array(node.get("translation", (0, 0, 0)), float) - scene.space.origin
-        color = np.array(entry.get("color", (1, 1, 1)), float) * entry.get("intensity", 1.0)
-        spot = entry.get("spot", {})
-        cone = spot.get("innerConeAngle", 0.0), spot.get("outerConeAngle", math.pi / 4)
-        lamps.append(PathLamp(entry["type"], color, place * scene.space.metres, way, cone))
-    return lamps
 
 
 class PathTracer:
     """Mitsuba's scene of a model; with ``matt``, all surfaces are diffuse and panes are absent."""
 
-    def __init__(self, model: Path, *, matt: bool) -> None:
+    def __init__(self, model: LitModel, *, matt: bool) -> None:
         import mitsuba
 
         compiled = bool(os.environ.get("DRJIT_LIBLLVM_PATH"))
         mitsuba.set_variant("llvm_ad_rgb" if compiled else "scalar_rgb")
-        self._mitsuba, self._matt = mitsuba, matt
-        self._scene, self._tree = ingest(model), gltf_of(model)
-        self._looks = {entry.get("name"): entry for entry in self._tree.get("materials", [])}
-        self._normal = corner_normals(self._scene.corners)
-        self._lamps = path_lamps(self._tree, self._scene)
+        self._mitsuba, self._model, self._matt = mitsuba, model, matt
         # Light of lamps passes panes in the integrator for volumes only.
-        panes = not matt and any(m.transparent and m.image < 0 for m in self._scene.materials)
-        kind = "volpath" if panes else "path"
-        light = {"type": kind, "max_depth": _DEPTH}
+        panes = not matt and any(m.transparent and m.image < 0 for m in model.scene.materials)
+        light = {"type": "volpath" if panes else "path", "max_depth": _DEPTH}
         guides = "albedo:albedo,normal:sh_normal"
         self._integrator = mitsuba.load_dict({"type": "aov", "aovs": guides, "light": light})
         self.seconds = 0.0
@@ -182,7 +127,21 @@ class PathTracer:
             self._traced = mitsuba.load_dict(self._description(Path(folder)))
 
     def trace(self, view: EyeView, size: tuple[int, int], noise: float) -> tuple[Floats, float]:
-        """(height, width, 3) linear light, and the standard error of its picture, of 255."""
+        """(height, width, 3) linear light, and the standard error of its picture, of 255. A view
+        that was traced before is read."""
+        key = repr(
+            (self._model.digest, self._model.daylight, self._matt, view, size, noise)
+        ).encode()
+        file = FOLDER / "traced" / f"{sha256(key).hexdigest()[:16]}.npz"
+        if file.is_file():
+            with np.load(file) as stored:
+                return stored["light"], float(stored["error"])
+        light, error = self._trace(view, size, noise)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(file, light=light, error=error)
+        return light, error
+
+    def _trace(self, view: EyeView, size: tuple[int, int], noise: float) -> tuple[Floats, float]:
         begin = process_time()
         passes: list[Floats] = []
         least, most = _PASSES
@@ -207,35 +166,29 @@ class PathTracer:
         return light, error
 
     def _description(self, folder: Path) -> dict[str, Any]:
-        scene, lamps = self._scene, self._lamps
+        model = self._model
         description: dict[str, Any] = {"type": "scene"}
-        ceilings = self._ceilings() if not lamps else np.zeros(len(scene.triangles), np.bool_)
-        for k, material in enumerate(scene.materials):
+        for k, material in enumerate(model.scene.materials):
             pane = material.transparent and material.image < 0
             if pane and self._matt:
                 continue
             for glowing in (False, True):
-                chosen = np.flatnonzero((scene.triangle_material == k) & (ceilings == glowing))
-                if not len(chosen):
+                faces = (model.scene.triangle_material == k) & (model.ceilings == glowing)
+                if not faces.any():
                     continue
-                shape = self._shape(folder / f"{k}-{glowing}.ply", chosen)
+                shape = self._shape(folder / f"{k}-{glowing}.ply", np.flatnonzero(faces))
                 shape["bsdf"] = _pane(material) if pane else self._surface(material)
-                radiance = CEILING * SKY * np.array(WARM) if glowing else self._emission(material)
+                radiance = CEILING * SKY * WARM if glowing else model.emission(material)
                 if radiance.any():
                     shape["emitter"] = {"type": "area", "radiance": rgb(radiance)}
                 description[f"material_{k}_{glowing}"] = shape
-        suns = [lamp for lamp in lamps if lamp.kind == "directional"]
-        sky = suns[0].color.mean() / 5 if suns else SKY
-        description["sky"] = {"type": "constant", "radiance": rgb(sky * np.array(BLUE))}
-        for k, lamp in enumerate(lamps):
+        # The sky above the horizon, and the ground below it.
+        around = np.repeat(np.array(model.daylight, np.float32), _ENVIRONMENT, axis=0)
+        bitmap = self._mitsuba.Bitmap(np.repeat(around[:, None], 2 * len(around), axis=1))
+        description["sky"] = {"type": "envmap", "bitmap": bitmap}
+        for k, lamp in enumerate(model.lamps):
             description[f"lamp_{k}"] = self._emitter(lamp)
         return description
-
-    def _ceilings(self) -> NDArray[np.bool_]:
-        """(T,) level faces that look down on a room."""
-        scene = self._scene
-        down = self._normal[:, 0, 1] < -0.9
-        return down & (scene.corners[..., 1].mean(axis=1) > scene.points[:, 1].min() + _OVER)
 
     def _shape(self, file: Path, chosen: NDArray[np.intp]) -> dict[str, Any]:
         count = len(chosen)
@@ -243,33 +196,27 @@ class PathTracer:
             file.stem, 3 * count, count, has_vertex_normals=True, has_vertex_texcoords=True
         )
         fields = self._mitsuba.traverse(mesh)
-        fields["vertex_positions"] = self._scene.corners[chosen].ravel().astype(np.float32)
-        fields["vertex_normals"] = self._normal[chosen].ravel().astype(np.float32)
-        fields["vertex_texcoords"] = self._scene.uv[chosen].ravel().astype(np.float32)
+        fields["vertex_positions"] = self._model.scene.corners[chosen].ravel().astype(np.float32)
+        fields["vertex_normals"] = self._model.normal[chosen].ravel().astype(np.float32)
+        fields["vertex_texcoords"] = self._model.scene.uv[chosen].ravel().astype(np.float32)
         fields["faces"] = np.arange(3 * count, dtype=np.uint32)
         fields.update()
         mesh.write_ply(str(file))
         return {"type": "ply", "filename": str(file)}
 
     def _surface(self, material: Material) -> dict[str, Any]:
-        look = self._looks.get(material.name, {}).get("pbrMetallicRoughness", {})
-        metallic = look.get("metallicFactor", 1.0) if look else 0.0
-        roughness = look.get("roughnessFactor", 1.0) if look else 1.0
-        tint = np.minimum(from_srgb(np.array(material.color)), _MOST)
-        color: dict[str, Any] = rgb(tint)
+        metallic, roughness = self._model.polish(material)
+        texels = self._model.color(material)
+        color: dict[str, Any] = rgb(texels[0, 0])
         if material.image >= 0:
             color = {
                 "type": "bitmap",
-                "bitmap": self._mitsuba.Bitmap(
-                    self._texels(material.image) * tint.astype(np.float32)
-                ),
+                "bitmap": self._mitsuba.Bitmap(np.ascontiguousarray(texels[::-1])),
                 "raw": True,
                 "wrap_mode": "repeat" if material.wrap_s == "repeat" else "clamp",
             }
-        surface: dict[str, Any]
-        if self._matt or (roughness >= 1 and metallic == 0):
-            surface = {"type": "diffuse", "reflectance": color}
-        else:
+        surface: dict[str, Any] = {"type": "diffuse", "reflectance": color}
+        if not self._matt and (roughness < 1 or metallic > 0):
             surface = {
                 "type": "principled",
                 "base_color": color,
@@ -278,20 +225,6 @@ class PathTracer:
                 "specular": 0.5,
             }
         return {"type": "twosided", "surface": surface}
-
-    @cache  # noqa: B019 - a tracer lives as long as its model
-    def _texels(self, index: int) -> NDArray[np.float32]:
-        """(h, w, 3) linear light of an image, upside down as Mitsuba has v, at most 512 a side."""
-        with Image.open(BytesIO(self._scene.images[index].load())) as image:
-            small = image.convert("RGB")
-            small.thumbnail((512, 512), Image.Resampling.BOX)
-            return np.minimum(from_srgb(np.asarray(small)[::-1] / 255), _MOST).astype(np.float32)
-
-    def _emission(self, material: Material) -> Floats:
-        entry = self._looks.get(material.name, {})
-        strong = entry.get("extensions", {}).get("KHR_materials_emissive_strength", {})
-        factor = np.array(entry.get("emissiveFactor", (0, 0, 0)), float)
-        return factor * strong.get("emissiveStrength", 1.0)
 
     def _emitter(self, lamp: PathLamp) -> dict[str, Any]:
         transform, color = self._mitsuba.ScalarTransform4f, rgb(lamp.color)
@@ -361,7 +294,7 @@ def _pane(material: Material) -> dict[str, Any]:
     return {"type": "mask", "opacity": max(material.opacity, 0.04), "sheet": sheet}
 
 
-def rgb(color: Floats) -> dict[str, Any]:
+def rgb(color: Floats | Singles) -> dict[str, Any]:
     """A colour of Mitsuba."""
     return {"type": "rgb", "value": [float(c) for c in color]}
 
@@ -425,7 +358,8 @@ def compare(name: str, given: argparse.Namespace) -> None:
     databases = {light: database_of(name, model, light) for light in given.light}
     size = given.width, given.height
     views = views_of(name, next(iter(databases.values())), given.views)
-    tracers = {kind: PathTracer(model, matt=kind == "matt") for kind in ("whole", "matt")}
+    lit = LitModel(model)
+    tracers = {kind: PathTracer(lit, matt=kind == "matt") for kind in ("whole", "matt")}
     columns = [f"{light}: {kind}" for light in databases for kind in tracers]
     print(
         f"\n## {name}\n\n| view | noise | {' | '.join(columns)} |\n|---|--:|{'--:|' * len(columns)}"

@@ -172,7 +172,7 @@ def _fans(
     fan, step = hemisphere(samples), max(1, RAYS // samples)
     for at in range(0, len(point), step):
         part = slice(at, at + step)
-        along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
+        along = (fan @ tangent_frames(normal[part], turn[part])).reshape(-1, 3)
         lifted = point[part] + around.lift * normal[part] - around.middle
         yield part, np.repeat(lifted, samples, axis=0), along
 
@@ -203,7 +203,7 @@ def count_escapes(
             origin = origin + length[kept, None] * along[kept] + around.lift * back
             ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
             turned = np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64)
-            frames = _frames(back, turned)
+            frames = tangent_frames(back, turned)
             along = np.einsum("nk,nkx->nx", ways, frames)
     return count
 
@@ -252,7 +252,7 @@ def turns(count: int) -> Floats:
     return np.asarray(np.arange(count) * _GOLDEN % 1.0)
 
 
-def _frames(normal: Floats, turn: Floats) -> Singles:
+def tangent_frames(normal: Floats, turn: Floats) -> Singles:
     """(n, 3, 3) rows: two tangents, turned, and the normal."""
     # Duff et al. 2017, without a branch but for the sign.
     x, y, z = normal.T

@@ -1,0 +1,186 @@
+"""Light of several bounces: what surfaces send to each other, and what reaches a point.
+
+Light is in units of the radiance of a white diffuse surface: irradiance / π. In each pass a patch
+gathers by a few rays what the patches that they meet reflect, in place, so that later patches of
+the same pass see it; the light of lamps is exact but for its shadows (`lamps`). Noise of a pass
+does not add up, since rays of the next meet other patches. A point has the light of its own rays,
+once more into the patches: what is near it shows in full detail. White rooms keep light for many
+passes; so before the last ones all gathered light grows by what it would still gain.
+
+(Gathering into the texels of lightmaps themselves takes three times as many rays, and has to wait
+for the atlases of all cells. Plain random walks from each texel take six times as long.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Singles
+from ptmtools.jit import kernel
+from ptmtools.light.occlusion import (
+    RAYS,
+    SPREAD,
+    Occluders,
+    hemisphere,
+    normals,
+    tangent_frames,
+    turns,
+)
+from ptmtools.light.patches import LightPatches, patch_number
+
+#: Passes, rays of a patch in each, and how many of the last passes count.
+PASSES, PASS_RAYS, COUNTED = 12, 4, 4
+#: A surface reflects at most this: a room of white surfaces would never be in balance.
+MOST_REFLECTED = 0.95
+
+
+@dataclass(frozen=True)
+class Daylight:
+    """The sky, (3,) radiance of each colour, and the light that the ground reflects."""
+
+    sky: Floats
+    ground: Floats
+
+
+@dataclass(frozen=True)
+class LightField:
+    """What the surfaces of a building send out.
+
+    Attributes
+    ----------
+    around: the faces that rays meet, in the order of ``patches``.
+    patches: their patches.
+    radiance: (patches, 3) float32.
+    daylight: what rays bring that leave the building.
+    """
+
+    around: Occluders
+    patches: LightPatches
+    radiance: Singles
+    daylight: Daylight
+
+    def gather(
+        self, point: Floats, normal: Floats, turn: Floats, samples: int, near: float
+    ) -> tuple[Singles, Singles]:
+        """(n, 3) light at (n, 3) points with (n, 3) unit normals, and (n,) the share of rays that
+        meet something nearer than ``near`` metres or the unlit side of a face: of a point that is
+        covered, or within a wall.
+
+        turn: (n,) rotation of the directions about the normals, in turns from 0 to 1.
+        """
+        light, blocked = np.empty((len(point), 3), np.float32), np.empty(len(point), np.float32)
+        fan, step = hemisphere(samples), max(1, RAYS // samples)
+        for at in range(0, len(point), step):
+            part = slice(at, at + step)
+            along = (fan @ tangent_frames(normal[part], turn[part])).reshape(-1, 3)
+            start = point[part] + self.around.lift * normal[part] - self.around.middle
+            origin = np.repeat(start, samples, axis=0)
+            light[part], blocked[part] = self._receive(origin, along, samples, near)
+        return light, blocked
+
+    def _receive(
+        self, origin: Floats, along: Singles, samples: int, near: float
+    ) -> tuple[Singles, Singles]:
+        hit = self.around.tree.run(
+            origin.astype(np.float32), np.ascontiguousarray(along, np.float32), output=True
+        )
+        facing = np.einsum("nx,nx->n", hit["Ng"], along) < 0
+        return receive(
+            hit["primID"], hit["u"], hit["v"], hit["tfar"], facing, along[:, 1].copy(),
+            self.patches.split, self.patches.first, self.radiance,
+            self.daylight.sky, self.daylight.ground, samples, near,
+        )  # fmt: skip
+
+
+def transport(
+    around: Occluders,
+    patches: LightPatches,
+    albedo: Floats,
+    direct: Floats,
+    daylight: Daylight,
+    passes: int = PASSES,
+) -> LightField:
+    """The light of a building in balance. ``albedo``: (F, 3) of the faces of the patches;
+    ``direct``: (patches, 3) the light of lamps."""
+    face, side, number = patches.faces()
+    normal = normals(patches.corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
+    reflected = np.minimum(albedo, MOST_REFLECTED)[face]
+    radiance = (reflected * direct).astype(np.float32)
+    field = LightField(around, patches, radiance, daylight)
+    step, counted = max(1, RAYS // PASS_RAYS), min(COUNTED, passes)
+    spread, area = turns(patches.count), patches.areas()[face]
+    sums: list[float] = []
+    light, total = np.zeros((2, patches.count, 3))
+    for turn in range(passes):
+        for at in range(0, patches.count, step):
+            part = slice(at, at + step)
+            shift = spread[part] + turn * SPREAD[1]
+            across, along = (shift * 7 + SPREAD[0] * turn) % 1.0, (shift * 3) % 1.0
+            point = patches.points(face[part], number[part], across, along)
+            light[part], _ = field.gather(point, normal[part], shift % 1.0, PASS_RAYS, 0.0)
+            radiance[part] = reflected[part] * (direct[part] + light[part])
+        if turn >= passes - counted:
+            total += light
+        sums.append(float(area @ light.mean(axis=1)))
+        if turn == passes - counted - 1:
+            radiance[:] = reflected * (direct + extrapolation(sums) * light)
+    radiance[:] = reflected * (direct + total / counted)
+    return field
+
+
+def extrapolation(sums: Sequence[float]) -> float:
+    """The factor from the last of some sums to their limit: each pass adds the same share of what
+    the one before added. 1 for fewer than three sums."""
+    if len(sums) < 3:
+        return 1.0
+    before, last = sums[-2] - sums[-3], sums[-1] - sums[-2]
+    if not 0 < last < before:
+        return 1.0
+    share = min(last / before, MOST_REFLECTED)
+    return 1 + last * share / (1 - share) / sums[-1]
+
+
+@kernel
+def receive(
+    face: NDArray[np.int32],
+    u: NDArray[np.float32],
+    v: NDArray[np.float32],
+    length: NDArray[np.float32],
+    facing: Bools,
+    upwards: NDArray[np.float32],
+    split: NDArray[np.int32],
+    first: NDArray[np.int64],
+    radiance: NDArray[np.float32],
+    sky: NDArray[np.float64],
+    ground: NDArray[np.float64],
+    samples: int,
+    near: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The mean of what ``samples`` rays of each point bring: see `LightField.gather`."""
+    count = len(face) // samples
+    light, blocked = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+    for p in range(count):
+        red, green, blue, stopped = 0.0, 0.0, 0.0, 0
+        for ray in range(p * samples, (p + 1) * samples):
+            f = face[ray]
+            if f < 0:
+                if upwards[ray] >= 0:
+                    red, green, blue = red + sky[0], green + sky[1], blue + sky[2]
+                else:
+                    red, green, blue = red + ground[0], green + ground[1], blue + ground[2]
+                continue
+            start = first[f, 0 if facing[ray] else 1]
+            if start < 0 or length[ray] < near:
+                stopped += 1
+            if start >= 0:
+                k = start + patch_number(split[f], u[ray], v[ray])
+                red += radiance[k, 0]
+                green += radiance[k, 1]
+                blue += radiance[k, 2]
+        light[p, 0], light[p, 1], light[p, 2] = red / samples, green / samples, blue / samples
+        blocked[p] = stopped / samples
+    return light, blocked
