@@ -6,12 +6,20 @@ import ctypes
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import click
 import pytest
 
 from ptmtools.cli.main import main
+
+
+@pytest.fixture(autouse=True)
+def heeding_interrupts() -> Iterator[None]:
+    """A suite in the background of a shell ignores Ctrl-C, and so would the program."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def callback() -> None:
