@@ -15,7 +15,7 @@ from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.about import element_tags
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.site.entry import SiteEntry
-from ptmtools.site.program import ELEMENT, element
+from ptmtools.site.program import ELEMENT, fixed_script
 from ptmtools.site.serving import serving
 from ptmtools.tour.starting import first_tour
 
@@ -47,7 +47,7 @@ def served(toured: Site) -> Iterator[str]:
 
 def host(chromium: Any, site: str, more: str = "") -> Any:
     """A context manager of the host's page, of another origin; ``more`` are attributes."""
-    tags = element_tags("The museum", ELEMENT, element().read(), site)
+    tags = element_tags("The museum", ELEMENT, fixed_script(ELEMENT).read(), site)
     tags = tags.replace("<ptm-walk ", f'<ptm-walk {more} style="width:640px;height:480px" ')
     text = HOST.format(tags=tags).encode()
     return serving({"index.html": SiteEntry("index.html", text, "text/html; charset=utf-8")})
@@ -128,7 +128,7 @@ def test_a_frame_without_an_interface_that_begins_at_a_label(
 
 
 def test_a_script_of_other_contents_does_not_run(chromium: Any, served: str) -> None:
-    tags = element_tags("The museum", ELEMENT, element().read() + b" ", served)
+    tags = element_tags("The museum", ELEMENT, fixed_script(ELEMENT).read() + b" ", served)
     text = HOST.format(tags=tags).encode()
     with serving({"index.html": SiteEntry("index.html", text, "text/html; charset=utf-8")}) as url:
         page = chromium.new_context().new_page()
