@@ -152,10 +152,10 @@ def leaf_notes(cells: Cells, reached: Bools) -> list[str]:
     return notes
 
 
-def triangle_notes(pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
-    """The note on triangles without a piece in any cell."""
+def triangle_notes(triangles: int, pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
+    """The note on those of a number of triangles that have no piece in any cell."""
     owned = pieces.source[np.any(owner >= 0, axis=1)]
-    lost = len(np.unique(pieces.source)) - len(np.unique(owned))
+    lost = triangles - len(np.unique(owned))
     return [f"{lost} triangles lie outside all cells and are never visible"] * (lost > 0)
 
 
