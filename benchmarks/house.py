@@ -47,7 +47,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/cells": (7_990, 26),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
-    "ptmtools/light": (2_370, 12),
+    "ptmtools/light": (2_375, 12),
     "ptmtools/meshopt": (870, 5),
     "ptmtools/output": (7_760, 39),
     "ptmtools/pipeline": (3_680, 19),

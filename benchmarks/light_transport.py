@@ -110,7 +110,7 @@ class TransportedView:
         light = light + self._direct(point, normal, spread, _PIXEL_SHADOWS)
         self._gathering += process_time() - begin
         self._points += len(point)
-        picture = np.tile(self._model.sky, (len(way), 1))
+        picture = np.where(way[:, 1:2] >= 0, *self._model.daylight)
         picture[shown] = self._base(face, hit["u"][shown], hit["v"][shown]) * light
         picture[shown] += luminous(self._model)[face]
         return picture.reshape(size[1], size[0], 3)
@@ -121,7 +121,9 @@ class TransportedView:
         normal = normals(patches.corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
         spread, light = turns(len(face)), np.zeros((len(face), 3))
         for k in range(_POINTS):
-            point = patches.points(face, number, (spread + k / 4) % 1, (3 * spread + k / 2) % 1)
+            point = patches.points(
+                face, number, (spread + k / _POINTS) % 1, (3 * spread + k / 2) % 1
+            )
             light += self._direct(point, normal, spread, _SHADOWS) / _POINTS
         return light
 

@@ -1,9 +1,9 @@
 """Patches of the surfaces of a building, between which light is transported.
 
 A face is divided into n² triangles alike by lines parallel to its edges, and each side of it has
-patches of its own. Row i, from the first corner's opposite edge on, has 2 (n - i) - 1 triangles;
-those before it are i (2 n - i). A point with barycentric coordinates (1 - u - v, u, v) lies in row
-⌊n u⌋ and column ⌊n v⌋, above the diagonal of that rhomb or below it.
+patches of its own. Row i, from the edge between the first and the third corner on, has
+2 (n - i) - 1 triangles; those before it are i (2 n - i). A point with barycentric coordinates
+(1 - u - v, u, v) lies in row ⌊n u⌋ and column ⌊n v⌋, above the diagonal of that rhomb or below it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.jit import inlined_kernel, kernel
 
-#: Largest number of parts of an edge: patches of a face of a kilometre.
+#: Largest number of parts of an edge; the patches of a face of a kilometre are larger.
 _MOST = 256
 
 

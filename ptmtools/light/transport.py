@@ -85,6 +85,10 @@ class LightField:
     def _receive(
         self, origin: Floats, along: Singles, samples: int, near: float
     ) -> tuple[Singles, Singles]:
+        if self.around.tree is None:
+            sky = np.where(along[:, 1:2] >= 0, self.daylight.sky, self.daylight.ground)
+            mean = sky.reshape(-1, samples, 3).mean(axis=1)
+            return mean.astype(np.float32), np.zeros(len(mean), np.float32)
         hit = self.around.tree.run(
             origin.astype(np.float32), np.ascontiguousarray(along, np.float32), output=True
         )
@@ -105,7 +109,7 @@ def transport(
     passes: int = PASSES,
 ) -> LightField:
     """The light of a building in balance. ``albedo``: (F, 3) of the faces of the patches;
-    ``direct``: (patches, 3) the light of lamps."""
+    ``direct``: (patches, 3) the light of lamps; ``passes``: at least 1."""
     face, side, number = patches.faces()
     normal = normals(patches.corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
     reflected = np.minimum(albedo, MOST_REFLECTED)[face]

@@ -92,6 +92,15 @@ def test_white_surfaces_do_not_keep_all_light() -> None:
     assert light_on(field, 0).max() < 25
 
 
+def test_nothing_but_the_sky() -> None:
+    field = field_of(box(-1, 1, inwards=False), 0.5, 0.0, OVERCAST, 1.0)
+    around = Occluders(field.around.points, field.around.triangles[:0], np.zeros(3), 0.0, 1e-6)
+    empty = LightField(around, field.patches, field.radiance, Daylight(np.ones(3), np.zeros(3)))
+    point, up = np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]])
+    assert empty.gather(point, up, np.zeros(1), 16, 0.0)[0].tolist() == [[1.0, 1.0, 1.0]]
+    assert empty.gather(point, -up, np.zeros(1), 16, 0.0)[0].tolist() == [[0.0, 0.0, 0.0]]
+
+
 def test_points_that_are_covered_are_noticed() -> None:
     sheet = np.array([[[-1, 0.01, -1], [-1, 0.01, 1], [1, 0.01, 1]]], float)
     corner = np.concatenate([box(-1, 1, inwards=False) - [0, 1, 0], sheet])
