@@ -129,10 +129,9 @@ class PathTracer:
     def trace(self, view: EyeView, size: tuple[int, int], noise: float) -> tuple[Floats, float]:
         """(height, width, 3) linear light, and the standard error of its picture, of 255. A view
         that was traced before is read."""
-        key = repr(
-            (self._model.digest, self._model.daylight, self._matt, view, size, noise)
-        ).encode()
-        file = FOLDER / "traced" / f"{sha256(key).hexdigest()[:16]}.npz"
+        tracing = _DEPTH, _PATHS, _PASSES, noise
+        key = repr((self._model.digest, self._model.daylight, self._matt, view, size, tracing))
+        file = FOLDER / "traced" / f"{sha256(key.encode()).hexdigest()[:16]}.npz"
         if file.is_file():
             with np.load(file) as stored:
                 return stored["light"], float(stored["error"])
