@@ -36,12 +36,13 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from lit_model import CEILING, SKY, WARM, LitModel, PathLamp, from_srgb
+from lit_model import CEILING, SKY, WARM, LitModel, PathLamp
 from numpy.typing import NDArray
 from PIL import Image
 from scenes import ROOT, model_file
 
 from ptmtools.arrays import Floats, Singles
+from ptmtools.scene.colors import luminance, to_linear, to_srgb
 from ptmtools.scene.model import Material
 from ptmtools_lab.measures import flip
 
@@ -66,7 +67,6 @@ _DEPTH, _PATHS, _PASSES = 12, 16, (4, 32)
 _ENVIRONMENT = 32
 #: The mean of log luminance that exposure aims at, a share of white.
 KEY = 0.3
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,6 @@ class EyeView:
     eye: tuple[float, ...]
     look: tuple[float, ...]
     field: float = 60.0
-
-
-def to_srgb(light: Floats) -> Floats:
-    """sRGB values in [0, 1] of linear light."""
-    clipped = np.clip(light, 0, 1)
-    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
 
 
 def neutral(light: Floats) -> Floats:
@@ -103,9 +97,9 @@ def displayed(light: Floats, exposure: float) -> Floats:
 
 def exposure_of(light: Floats) -> float:
     """The factor that takes the mean of the log luminance to `KEY`; extremes do not count."""
-    luminance = light @ LUMINANCE
-    low, high = np.quantile(luminance, (0.02, 0.98))
-    return float(KEY / np.exp(np.log(np.clip(luminance, max(low, 1e-6), max(high, 1e-6))).mean()))
+    bright = luminance(light)
+    low, high = np.maximum(np.quantile(bright, (0.02, 0.98)), 1e-6)
+    return float(KEY / np.exp(np.log(np.clip(bright, low, high)).mean()))
 
 
 class PathTracer:
@@ -285,7 +279,7 @@ def _pane(material: Material) -> dict[str, Any]:
     """A polished sheet that is there by its opacity: light passes without refraction."""
     gloss = {
         "type": "principled",
-        "base_color": rgb(from_srgb(np.array(material.color))),
+        "base_color": rgb(to_linear(np.array(material.color))),
         "roughness": 0.03,
         "specular": 0.5,
     }

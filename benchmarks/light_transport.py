@@ -21,7 +21,6 @@ from time import process_time
 import numpy as np
 from light_reference import (
     FOLDER,
-    LUMINANCE,
     EyeView,
     PathTracer,
     database_of,
@@ -40,6 +39,7 @@ from ptmtools.light.lamps import Lamps, direct_light, lamps_of
 from ptmtools.light.occlusion import Occluders, normals, turns
 from ptmtools.light.patches import LightPatches
 from ptmtools.light.transport import PASSES, Daylight, transport
+from ptmtools.scene.colors import luminance
 from ptmtools.scene.lights import Lights
 from ptmtools.scene.model import Material
 from ptmtools_lab.measures import flip
@@ -161,7 +161,7 @@ def luminous(model: LitModel) -> Floats:
 def colored_lamps(model: LitModel) -> Iterator[tuple[Lamps, Floats]]:
     """Lamps and surfaces of one colour, and it: (3,) with a luminance of 1."""
     scene = model.scene
-    shades = [lamp.color / (lamp.color @ LUMINANCE) for lamp in model.lamps]
+    shades = [lamp.color / luminance(lamp.color) for lamp in model.lamps]
     for shade in np.unique(shades, axis=0) if shades else ():
         chosen = tuple(
             lamp
@@ -180,7 +180,7 @@ def colored_lamps(model: LitModel) -> Iterator[tuple[Lamps, Floats]]:
             triangle_material=material.astype(scene.triangle_material.dtype),
         )
         glow = np.zeros(len(lit.materials), np.float32)
-        glow[-1] = color @ LUMINANCE
+        glow[-1] = luminance(color)
         lights = replace(Lights.none(len(lit.materials)), glow=glow)
         yield lamps_of(lit, lights), color / glow[-1]
 

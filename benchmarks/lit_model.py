@@ -25,6 +25,7 @@ from ptmtools_samples.lit_hall import corner_normals
 from ptmtools.arrays import Bools, Floats
 from ptmtools.glb import glb_chunks
 from ptmtools.scene import Scene, ingest
+from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material
 
 #: Nits of a cloudy sky, and its colour; of ceilings the share of it, and their colour.
@@ -51,12 +52,6 @@ class PathLamp:
     cone: tuple[float, float]
 
 
-def from_srgb(encoded: Floats) -> Floats:
-    """Linear light of sRGB values in [0, 1]."""
-    low = encoded / 12.92
-    return np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4)
-
-
 def path_lamps(tree: dict[str, Any], scene: Scene) -> list[PathLamp]:
     """The lamps of a GLB in nodes without parents."""
     name = "KHR_lights_punctual"
@@ -71,6 +66,8 @@ def path_lamps(tree: dict[str, Any], scene: Scene) -> list[PathLamp]:
         way = -np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
         place = np.array(node.get("translation", (0, 0, 0)), float) - scene.space.origin
         color = np.array(entry.get("color", (1, 1, 1)), float) * entry.get("intensity", 1.0)
+        if not color.any():
+            continue
         spot = entry.get("spot", {})
         cone = spot.get("innerConeAngle", 0.0), spot.get("outerConeAngle", math.pi / 4)
         lamps.append(PathLamp(entry["type"], color, place * scene.space.metres, way, cone))
@@ -133,7 +130,7 @@ class LitModel:
     def color(self, material: Material) -> NDArray[np.float32]:
         """(h, w, 3) reflectance, rows from the top; (1, 1, 3) without an image. An image has at
         most `_SIDE` texels a side."""
-        tint = np.minimum(from_srgb(np.array(material.color)), _MOST).astype(np.float32)
+        tint = np.minimum(to_linear(np.array(material.color)), _MOST).astype(np.float32)
         if material.image < 0:
             return tint[None, None]
         if material.image not in self._images:
@@ -141,6 +138,6 @@ class LitModel:
             with Image.open(BytesIO(data)) as image:
                 small = image.convert("RGB")
                 small.thumbnail((_SIDE, _SIDE), Image.Resampling.BOX)
-                texels = np.minimum(from_srgb(np.asarray(small) / 255), _MOST)
+                texels = np.minimum(to_linear(np.asarray(small) / 255), _MOST)
                 self._images[material.image] = texels.astype(np.float32)
         return np.asarray(self._images[material.image] * tint)
