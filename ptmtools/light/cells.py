@@ -30,8 +30,9 @@ from ptmtools.light.atlas import FILLED, unwrap
 from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
 from ptmtools.light.looks import SMALLEST, PaintedLight, RayLight, open_sides, planes
 from ptmtools.light.mixing import LightMix, MixedLight
-from ptmtools.light.model import CellSurfaces
+from ptmtools.light.model import CellSurfaces, light_codes
 from ptmtools.light.occlusion import Occluders, normals
+from ptmtools.scene.colors import encode_srgb
 
 if TYPE_CHECKING:
     from ptmtools.light.options import LightOptions
@@ -81,6 +82,7 @@ class CellLight:
     """
 
     mapped: Bools
+    lit: Bools
     uv: NDArray[np.float32]
     vertex: NDArray[np.uint8]
     texels: NDArray[np.uint8] | None
@@ -111,14 +113,17 @@ class LightBaking:
         corner = piece.corner.astype(np.float64)
         mapped = np.zeros(count, np.bool_)
         mapped[piece.shape[flat]] = True
+        shown = np.zeros(count, np.bool_)
+        shown[piece.shape[~piece.glass]] = True
         uv = np.zeros((len(corner), 3, 2), np.float32)
-        vertex = np.full((len(corner), 3), 255, np.uint8)
+        vertex = np.full((len(corner), 3, 3), 255, np.uint8)
         side = self.sides(corner, piece.side)
         for rows in _objects(piece.object, dense):
             look = self.look(corner[rows], side[rows], piece.face[rows], _AT_VERTICES)
-            vertex[rows] = self._encode(vertex_light(look, corner[rows], normals(corner[rows])))
+            grey = self._encode(vertex_light(look, corner[rows], normals(corner[rows])))
+            vertex[rows] = encode_srgb(grey / 255.0)[..., None]
         if not flat.any():
-            return CellLight(mapped, uv, vertex, None, False)
+            return CellLight(mapped, shown, uv, vertex, None, False)
         rows = np.flatnonzero(flat)
         points, triangles = np.unique(
             piece.corner[rows].reshape(-1, 3), axis=0, return_inverse=True
@@ -141,8 +146,8 @@ class LightBaking:
         uv[rows] = atlas.uv
         texels_a_metre = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), SMALLEST))
         reached = texels_a_metre / max(density, SMALLEST)
-        texels = self._encode(lit.value)
-        return CellLight(mapped, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
+        texels = np.repeat(light_codes(self._encode(lit.value) / 255.0, 1.0)[..., None], 3, axis=2)
+        return CellLight(mapped, shown, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
 
     def sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
         """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back; ``side``: see

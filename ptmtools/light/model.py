@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Ints
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.store.archive import Stored
 
 
@@ -35,26 +36,61 @@ class CellSurfaces:
     face: Ints
 
 
+#: Stops below white that the codes of lightmaps cover.
+STOPS = 10.0
+
+
+def light_codes(light: Floats | Singles, white: float) -> NDArray[np.uint8]:
+    """Light of any shape as codes, of 255: white is 255, and half of it 255 / `STOPS` less."""
+    share = np.maximum(light / white, 2.0**-STOPS)
+    code = np.clip(1 + np.log2(share) / STOPS, 0, 1)
+    return np.asarray(np.rint(255 * code), np.uint8)
+
+
+def coded_light(code: NDArray[np.uint8] | Floats, white: float) -> Floats:
+    """The inverse of `light_codes`; codes between whole numbers may be means of some."""
+    return np.asarray(white * 2.0 ** (STOPS * (np.asarray(code, np.float64) / 255 - 1)))
+
+
 @dataclass(frozen=True)
 class Light:
-    """The light of all cells, in the order of triangles and shapes of `output.geometry.Geometry`.
+    """The light of all cells, in the order of triangles and shapes of `output.geometry.Geometry`:
+    irradiance / pi in linear colours (Rec. 709), in units in which the usual exposure is 1.
 
     Attributes
     ----------
     side: (C,) int32 texels, width and height of the lightmap of each cell; 0 without one.
-    mapped: (S,) whether a shape is lit by the lightmap of its cell, or at its vertices.
+    white: (C,) the light of each cell of which codes and `vertex` are shares.
+    exposure: (C,) the factor with which the light shows while the eye is in the cell.
+    lit, mapped: (S,) whether a shape has light, and whether in the lightmap of its cell; else it is
+        at its vertices.
     uv: (M, 3, 2) float32 coordinates in that lightmap, in [0, 1], origin at the lower left.
-    vertex: (M, 3) uint8 linear light at the corners, of 255; 255 in shapes with a lightmap.
+    vertex: (M, 3, 3) uint8 shares of white at the corners, encoded as sRGB; 255 where it is not at
+        vertices.
+    horizon: (2, 3) radiance of the sky and of the ground.
+    toned: whether the light shows by a tone curve; else it is the model's own, of 1 at most.
     """
 
     side: NDArray[np.int32]
+    white: Floats
+    exposure: Floats
+    lit: Bools
     mapped: Bools
     uv: NDArray[np.float32]
     vertex: NDArray[np.uint8]
+    horizon: Floats
+    toned: bool = True
+
+    def display(self) -> dict[str, Any]:
+        """The member "light" of the hints, see docs/formats/hints.md."""
+        if not self.toned:
+            return {"stops": STOPS, "tone": "plain"}
+        sky, ground = np.round(self.horizon, 4).tolist()
+        return {"stops": STOPS, "tone": "neutral", "sky": sky, "ground": ground}
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The light as plain arrays."""
-        return dict(vars(self))
+        return vars(self) | {"toned": np.array([self.toned])}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Light:
@@ -66,9 +102,20 @@ class Light:
         side = stored.array("side", np.int32, None)
         if (side < 0).any():
             raise ValueError("a lightmap has a negative size")
+        white, exposure = (
+            stored.array(name, np.float64, len(side), finite=True) for name in ("white", "exposure")
+        )
+        if not ((white > 0).all() and (exposure > 0).all()):
+            raise ValueError("a cell has no light of white, or no exposure")
+        mapped = stored.array("mapped", np.bool_, None)
         return Light(
             side,
-            stored.array("mapped", np.bool_, None),
+            white,
+            exposure,
+            stored.array("lit", np.bool_, len(mapped)),
+            mapped,
             uv,
-            stored.array("vertex", np.uint8, len(uv), 3),
+            stored.array("vertex", np.uint8, len(uv), 3, 3),
+            stored.array("horizon", np.float64, 2, 3, finite=True),
+            bool(stored.array("toned", np.bool_, 1)[0]),
         )

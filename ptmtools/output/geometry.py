@@ -20,7 +20,7 @@ from ptmtools.arrays import areas, sum_by_group
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import single
-from ptmtools.scene.colors import gradients, to_linear, to_srgb
+from ptmtools.scene.colors import encode_srgb, gradients, to_linear
 from ptmtools.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ class Shape:
         and the frames there, see `NormalMap`; None without one.
     normal: (m, 3, 2) float32 coordinates of the corners in the normal map of the material,
         likewise, if that has its own; else None.
+    lit: whether it has light, in the lightmap or, as a factor of its colours, at its corners.
     """
 
     object: int
@@ -61,6 +62,7 @@ class Shape:
     light: NDArray[np.float32] | None = None
     relief: NDArray[np.float32] | None = None
     normal: NDArray[np.float32] | None = None
+    lit: bool = False
 
 
 class Geometry:
@@ -142,10 +144,10 @@ class Geometry:
         result = copy(self)
         result.light = light
         if (light.vertex < 255).any():
-            color = np.full((*light.vertex.shape, 3), 255, np.uint8)
-            color = color if self.color is None else self.color
-            linear = to_linear(color / 255) * (light.vertex[..., None] / 255)
-            result.color = np.rint(255 * to_srgb(linear)).astype(np.uint8)
+            color = light.vertex
+            if self.color is not None:
+                color = encode_srgb(to_linear(color / 255) * to_linear(self.color / 255))
+            result.color = color
         return result
 
     def with_object_maps(self, maps: ObjectMaps, scene: Scene, cells: Cells) -> Geometry:
@@ -190,6 +192,7 @@ class Geometry:
             self.light.uv[rows] if self.light is not None and self.light.mapped[s] else None,
             self.relief[rows] if self.relief is not None and self.relieved[s] else None,
             self.normal[rows] if self.normal is not None and self._own_normal[s] else None,
+            self.light is not None and bool(self.light.lit[s]),
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:

@@ -39,6 +39,7 @@ from ptmtools.output.gltf_compressed import CompressedBuffer
 from ptmtools.output.gltf_shapes import PlainBuffer, Sizes, VertexTables, vertices_of
 from ptmtools.output.model import FileError, TextureRecord, convert_shape_errors
 from ptmtools.output.names import GLTF_FILES, UP, cell_name, mesh_name, mesh_path, path_of
+from ptmtools.output.numbers import significant
 from ptmtools.output.representation import node_extras, replaced_objects
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material, Wrap
@@ -102,14 +103,15 @@ class MaterialWriter:
         textures: Mapping[int, tuple[int, TextureRecord]],
         fallback: bool,
         lightmap: tuple[int, TextureRecord] | None,
+        white: float | None,
         reliefs: Mapping[int, tuple[int, TextureRecord]],
     ) -> None:
         """``textures``: for every image its index in the hints' list, and its record; ``lightmap``
         and ``reliefs``: the same for the lightmap of the cell, and for the normal maps of
-        objects."""
+        objects; ``white``: see `Light`."""
         self._scene = materials
         self._records = textures
-        self._lightmap = lightmap
+        self._lightmap, self._white = lightmap, white
         self._reliefs = reliefs
         self._fallback = fallback
         self._known: dict[tuple[Any, ...], int] = {}
@@ -125,18 +127,21 @@ class MaterialWriter:
         mesh: int | None,
         *,
         lit: bool,
+        mapped: bool,
         relief: int | None = None,
         normal: int | None = None,
     ) -> int:
         """The index of a scene's material, seen from one side or from both; of a coarsest mesh with
-        finer ones, its row in the hints is ``mesh``. ``lit``: whether the lightmap lights it;
-        ``relief``: the object whose normal map it has; ``normal``: the number of the coordinates in
-        its own."""
-        key = material, two_sided, mesh, lit, relief, normal
+        finer ones, its row in the hints is ``mesh``. ``lit``, ``mapped``: whether it has light, and
+        in the lightmap; ``relief``: the object whose normal map it has; ``normal``: the number of
+        the coordinates in its own."""
+        key = material, two_sided, mesh, lit, mapped, relief, normal
         place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
             row = self._material(self._scene[material], two_sided, mesh)
             if lit:
+                row["extras"] = row.get("extras", {}) | {"white": self._white}
+            if mapped:
                 assert self._lightmap
                 self._add(row, "light", "occlusionTexture", *self._lightmap)
             if relief is not None:
@@ -305,9 +310,10 @@ def _texture_sizes(content: Content, cell: int, shape: Shape, normal: int | None
 def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> bytes:
     scene, options, places = content.scene, content.options, content.places
     buffer = PlainBuffer() if options.plain_gltf else CompressedBuffer(content.position_exponent)
-    lightmap = places.of_cell.get(cell)
+    lightmap, light = places.of_cell.get(cell), content.extras.light
+    white = significant(light.white[cell : cell + 1])[0] if light else 0.0
     materials = MaterialWriter(
-        scene.materials, places.of_image, options.fallback, lightmap, places.of_object
+        scene.materials, places.of_image, options.fallback, lightmap, white, places.of_object
     )
     represented = content.extras.represented
     replaced, extras = replaced_objects(represented), node_extras(represented)
@@ -322,7 +328,8 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
             shape.material,
             shape.two_sided,
             place,
-            lit=shape.light is not None,
+            lit=shape.lit,
+            mapped=shape.light is not None,
             relief=None if shape.relief is None else shape.object,
             normal=normal,
         )

@@ -38,6 +38,8 @@ class ReadMaterial:
     ptm, texture: URI of the `.ptm` and its index in the hints, or None.
     wrap: numbers of the sampler for s and t.
     mesh: its object's row in the hints if this mesh is the coarsest of several, or None.
+    white: the light of which the codes of lightmaps and the colours of lit corners are shares, or
+        None of what is not lit.
     light, lightmap: index in the hints of the lightmap of the cell, and URI of that as an image, or
         None.
     normal, normal_map: the same for the normal map of the object or of the material; coords,
@@ -54,6 +56,7 @@ class ReadMaterial:
     texture: int | None
     wrap: tuple[int, int]
     mesh: int | None
+    white: float | None = None
     light: int | None = None
     lightmap: str | None = None
     normal: int | None = None
@@ -351,6 +354,7 @@ class _GlbReader:
             texture=extras.get("texture"),
             wrap=wrap,
             mesh=extras.get("mesh"),
+            white=extras.get("white"),
             light=extras.get("light"),
             lightmap=lightmap,
             normal=extras.get("normal"),
@@ -381,7 +385,10 @@ def _wrap(sampler: dict[str, Any]) -> tuple[int, int]:
 def _check_extras(material: Mapping[str, Any], extras: Mapping[str, Any], place: str) -> None:
     """Raises FileError PTM-D731 where the extras of a material and its textures differ."""
     of_normal = {name for name in extras if name.startswith("normal")}
-    if extras.keys() - {"mesh", "light"} - of_normal and not {"ptm", "texture"} <= extras.keys():
+    if (
+        extras.keys() - {"mesh", "light", "white"} - of_normal
+        and not {"ptm", "texture"} <= extras.keys()
+    ):
         _foreign(f"{place}.extras", "has members of a texture, but not its .ptm and its place")
     coords, use = extras.get("normalCoords"), material.get("normalTexture")
     if use is not None and (
@@ -394,6 +401,8 @@ def _check_extras(material: Mapping[str, Any], extras: Mapping[str, Any], place:
     for texture, name in (("occlusionTexture", "light"), ("normalTexture", "normal")):
         if material.get(texture) is not None and name not in extras:
             _foreign(place, f"has an image of {name}, but not its place in the hints")
+    if "light" in extras and "white" not in extras:
+        _foreign(place, "has a lightmap, but not the light of its codes")
     if "light" in extras and "normal" in extras and coords is None:
         _foreign(place, "has both a lightmap and a normal map")
 

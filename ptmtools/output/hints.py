@@ -74,6 +74,9 @@ def index_text(content: Content) -> str:
         head["textureSets"] = sets
     if content.options.first_look:
         head["firstLook"] = FIRST_LOOK_FILES
+    if light := content.extras.light:
+        head["light"] = light.display()
+    exposures = significant(light.exposure, NEED_DIGITS) if light else []
     materials = content.scene.materials
     # Images that are normal maps of materials, and nothing else.
     normal_maps = {m.normal.image for m in materials if m.normal} - {m.image for m in materials}
@@ -89,6 +92,7 @@ def index_text(content: Content) -> str:
             {"name": cell_name(c), "box": box}
             | ({} if standing else {"standing": False})
             | ({"room": room} if (room := cells.room_name(c)) else {})
+            | ({"exposure": exposures[c]} if exposures and exposures[c] != 1 else {})
             for c, (box, standing) in enumerate(
                 zip(_boxes(content), cells.standing.tolist(), strict=True)
             )

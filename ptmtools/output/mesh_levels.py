@@ -181,6 +181,7 @@ def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> DetailLevel:
                 triangle,
                 uv_triangle,
                 color,
+                lit=shape.lit,
             )
         )
     return DetailLevel(mesh.points.astype(np.float32), table, tuple(parts), error)

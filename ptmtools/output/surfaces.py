@@ -76,6 +76,8 @@ class Surfaces:
         the hints, -1 without (`ptmtools.output.representation`).
     lightmap, spot: (n,) int32, the lightmap in the hints' textures, -1 without; (n, 3, 2) float64
         coordinates in it, origin at the upper left. None if there are no lightmaps.
+    white: (n,) the light of which the codes of lightmaps, and of those without one the colours of
+        corners, are shares; 0 of what is not lit. None if nothing is.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
     opacity: (n,) of the factor, 0 to 1.
     transparent: (n,) whether it, and the alpha of the texture, count. cutoff: (n,) of those
@@ -96,6 +98,7 @@ class Surfaces:
     represented: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
     lightmap: NDArray[np.int32] | None = None
     spot: Floats | None = None
+    white: Floats | None = None
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
     vertex_colors: Floats | None = None
@@ -105,8 +108,7 @@ class Surfaces:
 
     @property
     def light(self) -> Surfaces | None:
-        """The same surfaces with their lightmaps, linear light, as textures; None if there are no
-        lightmaps."""
+        """The same surfaces with their lightmaps as textures; None if there are no lightmaps."""
         if self.lightmap is None or self.spot is None:
             return None
         count = len(self.corner)
@@ -229,6 +231,9 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         },
         lightmap=spread(lightmap, np.int32) if max(lightmap, default=-1) >= 0 else None,
         spot=spot if max(lightmap, default=-1) >= 0 else None,
+        white=spread([m.white or 0.0 for m in materials], np.float64)
+        if any(m.white for m in materials)
+        else None,
         relief=_relief([p for _, p in shapes]),
         bumps=bumps_of([p for _, p in shapes], count),
         vertex_colors=None if all(p.color is None for _, p in shapes) else vertex_colors,
