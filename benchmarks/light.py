@@ -211,7 +211,8 @@ def with_panels(scene: Scene, cells: Cells) -> tuple[Scene, Lights]:
         materials=(*scene.materials, Material("panel")),
         colors=None,
     )
-    glow = np.append(np.zeros(materials, np.float32), np.float32(1))
+    glow = Lights.none(materials + 1).glow
+    glow[-1] = 1
     return longer, replace(Lights.none(materials + 1), glow=glow)
 
 

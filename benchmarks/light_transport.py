@@ -179,10 +179,10 @@ def colored_lamps(model: LitModel) -> Iterator[tuple[Lamps, Floats]]:
             materials=(*scene.materials, Material("glow")),
             triangle_material=material.astype(scene.triangle_material.dtype),
         )
-        glow = np.zeros(len(lit.materials), np.float32)
-        glow[-1] = luminance(color)
+        glow = Lights.none(len(lit.materials)).glow
+        glow[-1] = color
         lights = replace(Lights.none(len(lit.materials)), glow=glow)
-        yield lamps_of(lit, lights), color / glow[-1]
+        yield lamps_of(lit, lights), color / luminance(color)
 
 
 def eye_rays(view: EyeView, size: tuple[int, int]) -> tuple[Floats, NDArray[np.float32]]:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.jit import inlined_kernel, kernel
 from ptmtools.light.occlusion import RAYS, Occluders, normals, points_on, spread_over
+from ptmtools.scene.colors import luminance
 from ptmtools.scene.lights import KINDS, Lights
 from ptmtools.scene.model import Scene
 
@@ -125,7 +126,8 @@ def _merge_groups(lamps: Lamps, group: Ints, kind: NDArray[np.uint8]) -> Lamps:
 
 def lamp_luminance(scene: Scene, lights: Lights) -> Floats:
     """(M,) the luminance of each material that is a lamp, 0 of the others."""
-    glow = np.where(lights.glow >= LEAST, lights.glow, 0.0).astype(np.float64)
+    glow = luminance(lights.glow.astype(np.float64))
+    glow = np.where(glow >= LEAST, glow, 0.0)
     area = areas(scene.corners)
     if area[glow[scene.triangle_material] > 0].sum() > _SHARE * area.sum():
         return np.zeros(len(glow))

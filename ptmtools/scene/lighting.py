@@ -16,10 +16,10 @@ import numpy as np
 
 from ptmtools.arrays import Ints, plane_areas
 from ptmtools.errors import PtmError
-from ptmtools.scene.colors import luminance, to_linear
+from ptmtools.scene.colors import to_linear
 from ptmtools.scene.faces import KeptFaces
 from ptmtools.scene.images import ImageStore, integers, read_within
-from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap
+from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap, Radiance
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.orientation.space import rotate, to_world
@@ -46,7 +46,7 @@ def lights_of(
     their numbers in the source."""
     materials = [source.materials[number] for number in used.tolist()]
     return Lights(
-        np.array([images.glow(material) for material in materials], np.float32),
+        np.array([images.glow(material) for material in materials], np.float32).reshape(-1, 3),
         np.array([material.unlit for material in materials], np.bool_),
         tuple(_place(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
@@ -60,20 +60,22 @@ class LightImages:
 
     def __init__(self, store: ImageStore, notes: IngestNotes) -> None:
         self._store, self.notes = store, notes
-        self._means = dict[Callable[[], bytes], float | None]()
+        self._means = dict[Callable[[], bytes], Radiance | None]()
         self._maps = dict[Callable[[], bytes], bytes | None]()
         self._held = dict[bytes, bytes]()
 
-    def glow(self, material: SourceMaterial) -> float:
-        """The linear luminance that a material emits, on average."""
-        glow = min(max(0.0, material.glow), MOST)
+    def glow(self, material: SourceMaterial) -> Radiance:
+        """The linear radiance that a material emits, on average."""
+        red, green, blue = (min(max(0.0, part), MOST) for part in material.glow)
+        glow = red, green, blue
         if glow != material.glow:
-            text = f"{material.name}: emission of {material.glow:g} changed to {glow:g}"
+            before, after = (" ".join(f"{v:g}" for v in part) for part in (material.glow, glow))
+            text = f"{material.name}: emission of {before} changed to {after}"
             self.notes.note("PTM-N215", text)
-        if not glow or material.glow_map is None:
+        if not any(glow) or material.glow_map is None:
             return glow
         mean = self._read(material.glow_map, self._means, _mean)
-        return glow if mean is None else glow * mean
+        return glow if mean is None else (red * mean[0], green * mean[1], blue * mean[2])
 
     def lightmap(self, texture: SourceTexture) -> bytes | None:
         """The bytes of a lightmap that can be decoded; equal ones are the same object. None, and a
@@ -107,8 +109,8 @@ class LightImages:
         return results[texture.read]
 
 
-def _mean(data: bytes, limit: int) -> float:
-    """The mean luminance of an image, linear light. Raises as `integers`."""
+def _mean(data: bytes, limit: int) -> Radiance:
+    """The mean colour of an image, linear light. Raises as `integers`."""
     texels, _ = integers(data, limit)
     largest = int(np.iinfo(texels.dtype).max)
     light = to_linear(np.arange(largest + 1) / largest)
@@ -119,7 +121,8 @@ def _mean(data: bytes, limit: int) -> float:
         for k, channel in enumerate(channels):
             row = texels[y : y + step, :, channel].ravel()
             counts[k] += np.bincount(row, minlength=largest + 1)
-    return float(luminance(counts @ light / counts.sum(axis=1)))
+    red, green, blue = (counts @ light / counts.sum(axis=1)).tolist()
+    return red, green, blue
 
 
 def _place(lamp: Lamp, space: Space) -> Lamp:

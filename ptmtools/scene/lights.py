@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,12 @@ from ptmtools.store.archive import Stored
 LampKind = Literal["point", "spot", "sun"]
 KINDS: tuple[LampKind, ...] = get_args(LampKind)
 MapWrap = Literal["repeat", "clamp", "mirror"]
-#: Largest intensity of a lamp, luminance of a surface, and coordinate of a lamp.
+#: Largest intensity of a lamp, radiance of a surface, and coordinate of a lamp.
 MOST = 1e9
 #: By their number in the arrays.
 WRAPS: tuple[MapWrap, ...] = get_args(MapWrap)
+#: Red, green and blue, linear (ITU-R BT.709).
+Radiance: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class Lamp:
     intensity: linear luminance: candela, or lux of a sun. Lamps of a kind compare.
     cone: cosines of the angles to the direction up to which a spot has all of its light, and from
         which none.
+    color: linear red, green and blue, of luminance 1.
     """
 
     kind: LampKind
@@ -44,6 +47,7 @@ class Lamp:
     direction: tuple[float, float, float] = (0.0, -1.0, 0.0)
     intensity: float = 1.0
     cone: tuple[float, float] = (1.0, 0.0)
+    color: Radiance = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class Lights:
 
     Attributes
     ----------
-    glow: (M,) float32 linear luminance that a material emits.
+    glow: (M, 3) float32 linear radiance that a material emits: red, green and blue.
     unlit: (M,) bool, whether its colours contain their light.
     lamps: those without a surface.
     map: (M,) int32 index into `maps`, -1 of materials without.
@@ -87,7 +91,7 @@ class Lights:
     def none(materials: int) -> Lights:
         """Those of a scene without any."""
         return Lights(
-            np.zeros(materials, np.float32),
+            np.zeros((materials, 3), np.float32),
             np.zeros(materials, np.bool_),
             (),
             np.full(materials, -1, np.int32),
@@ -110,13 +114,14 @@ class Lights:
         images = list(dict.fromkeys(item.data for item in self.maps))
         start = np.cumsum([0, *map(len, images)])
         rows = [
-            [*lamp.position, *lamp.direction, lamp.intensity, *lamp.cone] for lamp in self.lamps
+            [*lamp.position, *lamp.direction, lamp.intensity, *lamp.cone, *lamp.color]
+            for lamp in self.lamps
         ]
         return {
             "glow": self.glow,
             "unlit": self.unlit,
             "lamp_kind": np.array([KINDS.index(lamp.kind) for lamp in self.lamps], np.uint8),
-            "lamp": np.array(rows, np.float64).reshape(-1, 9),
+            "lamp": np.array(rows, np.float64).reshape(-1, 12),
             "map": self.map,
             "uv": self.uv,
             "map_image": np.array([images.index(item.data) for item in self.maps], np.int32),
@@ -132,9 +137,9 @@ class Lights:
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Lights:
         """Inverse of `to_arrays`. Raises KeyError or ValueError for other arrays."""
         stored = Stored(arrays)
-        glow = stored.array("glow", np.float32, None, finite=True)
+        glow = stored.array("glow", np.float32, None, 3, finite=True)
         kind = stored.indices("lamp_kind", np.uint8, None, high=len(KINDS))
-        rows = stored.array("lamp", np.float64, len(kind), 9, finite=True)
+        rows = stored.array("lamp", np.float64, len(kind), 12, finite=True)
         strength = stored.array("map_strength", np.float64, None, finite=True)
         count = len(strength)
         wrap = stored.indices("map_wrap", np.uint8, count, 2, high=len(WRAPS))
@@ -146,7 +151,14 @@ class Lights:
             glow,
             stored.array("unlit", np.bool_, len(glow)),
             tuple(
-                Lamp(KINDS[k], tuple(row[:3]), tuple(row[3:6]), row[6], tuple(row[7:]))
+                Lamp(
+                    KINDS[k],
+                    tuple(row[:3]),
+                    tuple(row[3:6]),
+                    row[6],
+                    tuple(row[7:9]),
+                    tuple(row[9:]),
+                )
                 for k, row in zip(kind.tolist(), rows.tolist(), strict=True)
             ),
             stored.indices("map", np.int32, len(glow), low=-1, high=count),

@@ -24,7 +24,6 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.colors import luminance
 from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.notes import IngestNotes
@@ -138,9 +137,8 @@ def _shine(material: MtlMaterial) -> Shine | None:
 def _glow(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
     """The emission of a material, as the fields of a `SourceMaterial`. ``Ke`` is a factor of
     ``map_Ke``; without ``Ke`` it is 1. An image that is missing counts as white."""
-    factor = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
-    glow = float(luminance(np.array(factor)))
-    if not (used and glow):
+    glow = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
+    if not (used and any(glow)):
         return {}
     image = None
     if material.map_ke is not None:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.files import open_regular
 from ptmtools.scene.faces import keep_faces
-from ptmtools.scene.lights import Lamp
+from ptmtools.scene.lights import Lamp, Radiance
 from ptmtools.scene.model import Camera, Kind, Note, RoomVolume, Shine, Storey, Wrap
 
 SourceWrap = Literal[Wrap, "mirror"]
@@ -125,7 +125,7 @@ class SourceMaterial:
     shine: its reflection map.
     normal: its normal map.
     unlit: the texture shows as it is, and contains its light (KHR_materials_unlit).
-    glow, glow_map: linear luminance that it emits, a factor of the mean of the image if it has one.
+    glow, glow_map: linear radiance that it emits, a factor of the mean of the image if it has one.
     """
 
     name: str
@@ -140,7 +140,7 @@ class SourceMaterial:
     shine: Shine | None = None
     normal: NormalTexture | None = None
     unlit: bool = False
-    glow: float = 0.0
+    glow: Radiance = (0.0, 0.0, 0.0)
     glow_map: SourceTexture | None = None
 
 

@@ -191,7 +191,7 @@ def test_damaged_lights(made: Path, tmp_path: Path, array: str) -> None:
     file = tmp_path / "db" / name
     data = file.read_bytes()
     arrays = dict(unpack_arrays(data, file=file))
-    arrays[array] = np.ones((1, 9)) if array == "lamp" else arrays[array][:-1]
+    arrays[array] = np.ones((1, 12)) if array == "lamp" else arrays[array][:-1]
     changed = pack_arrays(arrays)
     manifest = tmp_path / "db/manifest.json"
     manifest.write_text(manifest.read_text().replace(sha256(data), sha256(changed)))

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from ptmtools.scene import IngestOptions, Scene, ingest, lighting
-from ptmtools.scene.colors import luminance, to_linear
+from ptmtools.scene.colors import to_linear
 from ptmtools.scene.lighting import _place
-from ptmtools.scene.lights import MOST, Lamp, Lights
+from ptmtools.scene.lights import MOST, Lamp, Lights, Radiance
 from ptmtools.scene.model import Space
 from ptmtools.texture.images.png import png_bytes
 from tests.scene.conftest import GltfModel, Put, png
@@ -52,6 +52,7 @@ def test_lamps_of_gltf(put: Put) -> None:
     # The middle of the wall's floor, (5, 0, 0), is the origin.
     assert point.position == pytest.approx((-4, 2, 3))
     assert (point.kind, point.intensity) == ("point", pytest.approx(40 * GREEN))
+    assert point.color == pytest.approx((0, 1 / GREEN, 0))
     down = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]
     spot = {"type": "spot", "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.6}}
     (lamp,) = with_lamp(put, spot, rotation=down, scale=[3, 3, 3], translation=[0, 1, 0]).lamps
@@ -62,7 +63,13 @@ def test_lamps_of_gltf(put: Put) -> None:
     (sun,) = with_lamp(put, {"type": "directional"}).lamps
     assert (sun.kind, sun.intensity) == ("sun", pytest.approx(1))
     assert sun.direction == pytest.approx((0, 0, -1))
-    assert with_lamp(put, {"type": "point", "intensity": 0}).lamps == ()
+    assert sun.color == pytest.approx((1, 1, 1))
+    amber = {"type": "spot", "color": [0.8, 0.4, 0]}
+    (lamp,) = with_lamp(put, amber).lamps
+    assert lamp.intensity == pytest.approx(0.4 * (2 * 0.2126 + GREEN))
+    assert np.array(lamp.color) * lamp.intensity == pytest.approx([0.8, 0.4, 0])
+    for dark in ({"intensity": 0}, {"color": [0, 0, 0]}):
+        assert with_lamp(put, {"type": "point", **dark}).lamps == ()
     (flat,) = with_lamp(put, {"type": "point"}, scale=[1, 1, 0], translation=[0, 1, 0]).lamps
     assert flat.position == pytest.approx((-4, 3, 3))
 
@@ -97,14 +104,15 @@ def test_large_numbers_are_clipped(put: Put, textured: Callable[..., Path]) -> N
     bright = {"type": "point", "intensity": 1e308, "color": [1e9, 1e9, 1e9]}
     scene = scene_with_lamp(put, bright)
     assert [lamp.intensity for lamp in lights(scene).lamps] == [MOST]
+    assert lights(scene).lamps[0].color == pytest.approx((1, 1, 1))
     assert ("PTM-N215", "node 1") in noted(scene)
     strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 1e300}}
     white = [1, 1, 1]
-    for scene in (
-        emitting(put, emissiveFactor=white, extensions=strong),
-        ingest(textured("Ke 1e300 0 0")),
+    for scene, glow in (
+        (emitting(put, emissiveFactor=white, extensions=strong), [MOST] * 3),
+        (ingest(textured("Ke 1e300 0 1")), [MOST, 0, 1]),
     ):
-        assert lights(scene).glow.tolist() == [MOST]
+        assert lights(scene).glow.tolist() == [glow]
         assert any("emission of" in note.message for note in scene.notes)
 
 
@@ -136,13 +144,16 @@ def emitting(
 def test_emission_of_gltf(put: Put) -> None:
     strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 20}}
     for material, expected in (
-        ({}, 0.0),
-        ({"emissiveFactor": [0, 0.5, 0]}, 0.5 * GREEN),
-        ({"emissiveFactor": [0, 0.5, 0], "extensions": strong}, 10 * GREEN),
-        ({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}, 0.5),
-        ({"emissiveTexture": {"index": 0}}, 0.0),
+        ({}, [0, 0, 0]),
+        ({"emissiveFactor": [0, 0.5, 0]}, [0, 0.5, 0]),
+        ({"emissiveFactor": [0.1, 0.5, 0], "extensions": strong}, [2, 10, 0]),
+        ({"emissiveFactor": [1, 0.5, 0], "emissiveTexture": {"index": 0}}, [0.5, 0.25, 0]),
+        ({"emissiveTexture": {"index": 0}}, [0, 0, 0]),
     ):
-        assert lights(emitting(put, **material)).glow.tolist() == pytest.approx([expected])
+        assert lights(emitting(put, **material)).glow == pytest.approx(np.array([expected]))
+    half_red = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}
+    red = emitting(put, image=png(HALF * np.uint8([1, 0, 0])), **half_red)
+    assert lights(red).glow == pytest.approx(np.array([[0.5, 0, 0]]))
     unlit = {"KHR_materials_unlit": {}}
     assert not emitting(put).lights
     bare = emitting(put, emissiveFactor=[1, 1, 1], extensions=unlit).lights
@@ -182,7 +193,7 @@ def test_an_image_without_effect_is_a_note(put: Put, image: bytes, limit: int) -
         ({"occlusionTexture": use}, 0.0),
     ):
         scene = emitting(put, image=image, options=options, **material)
-        assert lights(scene).glow.tolist() == pytest.approx([glow])
+        assert lights(scene).glow.tolist() == [[glow] * 3]
         assert not lights(scene).maps
         assert ("PTM-N206", "material 0") in noted(scene)
 
@@ -197,7 +208,7 @@ def test_missing_images_of_lights_are_no_misses(put: Put, textured: Callable[...
         doc.tree["meshes"][0]["primitives"][0]["material"] = 0
 
     scene = ingest(put("gone.gltf", GltfModel.wall(change).gltf()), IngestOptions(strict=True))
-    assert lights(scene).glow.tolist() == pytest.approx([1])
+    assert lights(scene).glow.tolist() == [[1, 1, 1]]
     assert ("PTM-N204", "material 0") in noted(scene)
     model = textured("Ke 1 1 1\nmap_Ke broken.png", {"broken.png": b"none"})
     scene = ingest(model, IngestOptions(unit="m", up="y", strict=True))
@@ -213,7 +224,7 @@ def test_the_mean_of_an_image(
     texels = np.random.default_rng(bands).integers(0, most, (37, 29, bands), dtype)
     monkeypatch.setattr(lighting, "_STRIP_TEXELS", 100)
     colors = texels[..., :3] if bands > 2 else texels.repeat(3, axis=2)
-    expected = luminance(to_linear(colors / most)).mean()
+    expected = to_linear(colors / most).mean(axis=(0, 1))
     assert lighting._mean(png_bytes(texels), 1 << 20) == pytest.approx(expected)
 
 
@@ -222,7 +233,7 @@ def test_images_are_decoded_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> N
     uses: list[int] = []
     mean = lighting._mean
 
-    def counted(data: bytes, limit: int) -> float:
+    def counted(data: bytes, limit: int) -> Radiance:
         uses.append(len(data))
         return mean(data, limit)
 
@@ -242,7 +253,7 @@ def test_images_are_decoded_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> N
         doc.tree["meshes"][0]["primitives"][0]["material"] = 0
 
     own = lights(ingest(put("shared.glb", GltfModel.wall(change).glb())))
-    assert own.glow.tolist() == pytest.approx([0.5] * 4)
+    assert own.glow == pytest.approx(np.full((4, 3), 0.5))
     assert len(uses) == 1
     assert own.map.tolist() == [0, 0, 0, 1]
     assert [each.strength for each in own.maps] == [1, 0.5]
@@ -251,19 +262,19 @@ def test_images_are_decoded_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_emission_of_obj(textured: Callable[..., Path]) -> None:
     mean = np.zeros((4, 4, 3), np.uint8)
-    mean[:2] = 255
+    mean[:2] = 255, 255, 0
     for mtl, expected in (
-        ("Ke 0 2 0", 2 * GREEN),
-        ("Ke 0 0 0", 0.0),
-        ("map_Ke glow.png", 0.5),
-        ("Ke 4 4 4\nmap_Ke glow.png", 2.0),
-        ("Ke 4 4 4\nmap_Ke gone.png", 4.0),
-        ("Ke spectral x.rfl", 0.0),
-        ("Ke nan 1 1\nmap_Ke -s", 0.0),
+        ("Ke 0 2 1", [0, 2, 1]),
+        ("Ke 0 0 0", [0, 0, 0]),
+        ("map_Ke glow.png", [0.5, 0.5, 0]),
+        ("Ke 4 2 4\nmap_Ke glow.png", [2, 1, 0]),
+        ("Ke 4 4 4\nmap_Ke gone.png", [4, 4, 4]),
+        ("Ke spectral x.rfl", [0, 0, 0]),
+        ("Ke nan 1 1\nmap_Ke -s", [0, 0, 0]),
     ):
         model = textured(mtl, {"glow.png": png(mean)})
         scene = ingest(model, IngestOptions(unit="m", up="y", strict=True))
-        assert lights(scene).glow.tolist() == pytest.approx([expected]), mtl
+        assert lights(scene).glow == pytest.approx(np.array([expected])), mtl
         assert ("glow.png" in scene.files) == ("glow.png" in mtl)
 
 

@@ -222,8 +222,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 11
-    changed = "the list of images has their sizes"
+    recipe = 12
+    changed = "lights have colours"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

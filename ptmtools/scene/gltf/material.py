@@ -1,6 +1,6 @@
 """Reads materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
 
-The reader keeps the normal map, how bright the emission is, and the base colour of the
+The reader keeps the normal map, the emission, and the base colour of the
 metallic-roughness model. The factor of this is linear light, but the tint of the emitted files is
 sRGB, so the factor is converted and the conversion noted; for partial tints the product of tint and
 texel differs from the linear product. The alpha of texels
@@ -18,7 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.scene.colors import luminance, to_srgb
+from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.gltf.compression import TranscodedBytes
 from ptmtools.scene.gltf.document import FAULTS, GltfDocument, data_uri, fault_of
 from ptmtools.scene.notes import IngestNotes
@@ -220,7 +220,8 @@ class GltfMaterialReader:
         use = entry.get("emissiveTexture")
         with self._notes.optional():
             image = None if use is None else self._texture(use["index"], place, 1.0)
-        return {"glow": strength * float(luminance(np.array(factor))), "glow_map": image}
+        red, green, blue = (strength * part for part in factor)
+        return {"glow": (red, green, blue), "glow_map": image}
 
     def _texture(self, index: int, place: str, strength: float) -> SourceTexture | None:
         tree = self._document.tree

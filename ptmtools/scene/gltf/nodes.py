@@ -169,12 +169,16 @@ def _lamp(entry: dict[str, Any], matrix: Floats) -> Lamp:
     one of `FAULTS`."""
     kind = _KINDS[entry["type"]]
     color = np.array([finite(part) for part in entry.get("color", [1.0, 1.0, 1.0])])
-    intensity = finite(entry.get("intensity", 1.0)) * float(luminance(color))
+    if largest := float(color.max()):
+        color /= largest
+    share = float(luminance(color))
+    intensity = finite(entry.get("intensity", 1.0)) * largest * share
+    red, green, blue = (color / (share or 1.0)).tolist()
     if not (np.abs(matrix[:3, 3]) <= MOST).all():
         raise ValueError(f"more than {MOST:g} m away")
     x, y, z = matrix[:3, 3].tolist()
     if kind == "point":
-        return Lamp(kind, (x, y, z), intensity=intensity)
+        return Lamp(kind, (x, y, z), intensity=intensity, color=(red, green, blue))
     with np.errstate(all="ignore"):
         way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     if not np.isfinite(way).all():
@@ -183,4 +187,5 @@ def _lamp(entry: dict[str, Any], matrix: Floats) -> Lamp:
     outer = min(finite(angles.get("outerConeAngle", math.pi / 4)), math.pi / 2)
     inner = min(finite(angles.get("innerConeAngle", 0.0)), outer)
     dx, dy, dz = way.tolist()
-    return Lamp(kind, (x, y, z), (dx, dy, dz), intensity, (math.cos(inner), math.cos(outer)))
+    cone = math.cos(inner), math.cos(outer)
+    return Lamp(kind, (x, y, z), (dx, dy, dz), intensity, cone, (red, green, blue))

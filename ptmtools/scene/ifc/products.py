@@ -240,7 +240,7 @@ def _shape(file: Any, element: Any) -> ProductShape:
     product = file.by_id(element.id)
     materials = UNSTYLED, *(material_of(file, style) for style in geometry.materials)
     if shines(product):
-        materials = tuple(replace(material, glow=GLOW) for material in materials)
+        materials = tuple(replace(material, glow=(GLOW,) * 3) for material in materials)
     return ProductShape(
         product,
         local @ placed[:3, :3].T + placed[:3, 3],

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pxr import Ar, Sdf, Usd, UsdGeom, UsdShade
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.scene.colors import encode_srgb, luminance, to_srgb
+from ptmtools.scene.colors import encode_srgb, to_srgb
 from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import SourceMaterial, SourceWrap
@@ -65,10 +65,11 @@ def tint(linear: Any) -> Color:
     return r, g, b
 
 
-def _glow(shader: Any) -> float:
-    """The linear luminance that a shader emits; images have no effect."""
-    emitted = np.array(_numbers(_resolve(shader.GetInput("emissiveColor"))[0], _ZEROS)[:3])
-    return float(luminance(np.maximum(emitted, 0.0)))
+def _glow(shader: Any) -> Color:
+    """The linear radiance that a shader emits; images have no effect."""
+    emitted = _numbers(_resolve(shader.GetInput("emissiveColor"))[0], _ZEROS[:3])
+    red, green, blue = (max(0.0, part) for part in emitted)
+    return red, green, blue
 
 
 class UsdMaterialReader:

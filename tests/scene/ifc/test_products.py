@@ -136,7 +136,7 @@ def test_light_fixtures_glow(tmp_path: Path, schema: str) -> None:
         ].glow
         for number, name in enumerate(source.objects)
     }
-    assert glow == {"wall": 0, "tap": 0, "panel": ifc_products.GLOW}
+    assert glow == {"wall": (0,) * 3, "tap": (0,) * 3, "panel": (ifc_products.GLOW,) * 3}
 
 
 def test_a_part_is_what_it_is_a_part_of(tmp_path: Path) -> None:

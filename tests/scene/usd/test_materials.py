@@ -38,6 +38,14 @@ def test_the_colour_of_nothing_said(read: Any) -> None:
     assert material.opacity == 1
 
 
+def test_emission_has_a_colour(read: Any) -> None:
+    on = made.stage()
+    glow = (0.5, 0.25, -1)
+    made.bind(made.mesh(on), made.material(on, "/World/paint", emissiveColor=glow))
+    (material,) = read(on).source.materials
+    assert material.glow == (0.5, 0.25, 0)
+
+
 @pytest.mark.parametrize(("opacity", "threshold", "shown"), [(0.3, 0.5, 0), (0.7, 0.5, 1)])
 def test_cut_out_is_all_or_nothing(read: Any, opacity: float, threshold: float, shown: int) -> None:
     on = made.stage()

@@ -79,6 +79,7 @@ def shader(on: Usd.Stage, path: str, kind: str, **inputs: Any) -> UsdShade.Shade
     made.CreateIdAttr(kind)
     types = {
         "diffuseColor": "Color3f",
+        "emissiveColor": "Color3f",
         "opacity": "Float",
         "opacityThreshold": "Float",
         "file": "Asset",
