@@ -3,8 +3,8 @@
 Embree finds the surface of each ray and the layers before it (`ptmtools.rendering.layers`), and the
 kernels of the simulator sample the textures. A lit picture has the lamp of
 `ptmtools.rendering.light`, and the relief of octree textures and of the normal maps of objects.
-Others have lightmaps, and shade surfaces without texture by the angle to the viewer, like the web
-page. All have the normal maps of materials.
+Others have baked light (`ptmtools.rendering.tone`), and shade other surfaces without texture by the
+angle to the viewer, like the web page. All have the normal maps of materials.
 """
 
 from __future__ import annotations
@@ -88,16 +88,17 @@ class ViewOptions:
 @dataclass(frozen=True)
 class Eye:
     """A viewpoint: position (3,) in metres, unit direction (3,), vertical field of view in
-    radians."""
+    radians, and the cell of the position, None if the index does not state it."""
 
     position: Floats
     direction: Floats
     field_of_view: float
+    cell: int | None = None
 
 
 def eye_of(served: Served, options: ViewOptions) -> Eye:
     """Returns the selected viewpoint. Raises InputError PTM-I111 if it does not exist."""
-    angle = FIELD_OF_VIEW
+    angle, cell = FIELD_OF_VIEW, None
     if options.eye:
         position = np.array(options.eye[:3], dtype=np.float64)
         yaw = math.radians(options.eye[3] if len(options.eye) > 3 else 0.0)
@@ -114,13 +115,13 @@ def eye_of(served: Served, options: ViewOptions) -> Eye:
         row = rows[number]
         position = np.array(row["position"], dtype=np.float64)
         direction = np.array(row["direction"], dtype=np.float64)
-        angle = _vertical(math.degrees(row["fieldOfView"]), options)
+        angle, cell = _vertical(math.degrees(row["fieldOfView"]), options), row.get("cell")
     if options.look:
         direction = np.array(options.look, dtype=np.float64) - position
     length = float(np.linalg.norm(direction))
     if length == 0:
         raise _option_error("--look is the position of the eye")
-    return Eye(position, direction / length, math.radians(options.field_of_view or angle))
+    return Eye(position, direction / length, math.radians(options.field_of_view or angle), cell)
 
 
 def draw_view(
@@ -136,10 +137,11 @@ def draw_view(
     from ptmtools.rendering.layers import Layers, blend, transparent_of
     from ptmtools.rendering.light import with_lamp
     from ptmtools.rendering.painting import SurfacePainter
+    from ptmtools.rendering.tone import show_vertex_light, tone_at
 
     eye = eye_of(served, options)
     if options.lit:
-        served = with_lamp(served)
+        served = with_lamp(show_vertex_light(served))
     surfaces = served.surfaces
     samples = _SAMPLES if options.width * options.height <= _MANY_PIXELS else 1
     camera = RayCamera(
@@ -149,7 +151,13 @@ def draw_view(
         options.width / options.height,
         options.height,
     )
-    painter = SurfacePainter(served, max_side=options.max_side, lit=options.lit, progress=progress)
+    painter = SurfacePainter(
+        served,
+        tone_at(served, eye.position, eye.cell),
+        max_side=options.max_side,
+        lit=options.lit,
+        progress=progress,
+    )
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, eye.position, eye.direction)
     sight, layers = Layers(surfaces).split(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints, cross
+from ptmtools.arrays import Bools, Floats, Ints, cross
 from ptmtools.rendering.records import Sight, Triangles
 
 #: Takes the place of 0 for the component of a ray along the normal of a plane seen edge-on.
@@ -40,10 +40,32 @@ def show_colors(
     triangles, ``vertex_colors`` (T, 3, 3), instead of the means of these."""
     if vertex_colors is None:
         return
-    uneven = (vertex_colors != vertex_colors[:, :1]).any(axis=(1, 2))
-    pixel = np.flatnonzero((sight.triangle >= 0) & uneven[sight.triangle])
+    pixel = np.flatnonzero((sight.triangle >= 0) & _uneven(vertex_colors)[sight.triangle])
+    mean = vertex_colors[sight.triangle[pixel]].mean(axis=1)
+    interpolated = _interpolate(sight, pixel, triangles, vertex_colors)
+    shown[pixel] *= np.divide(interpolated, mean, out=np.zeros_like(interpolated), where=mean > 0)
+
+
+def corner_values(sight: Sight, pixel: Ints, triangles: Triangles, values: Floats) -> Floats:
+    """(n, 3) between the ``values`` (T, 3, 3) of the corners of the triangles that some pixels
+    show."""
     triangle = sight.triangle[pixel]
-    color = vertex_colors[triangle]
+    result: Floats = values[triangle, 0]
+    rows = np.flatnonzero(_uneven(values)[triangle])
+    result[rows] = _interpolate(sight, pixel[rows], triangles, values)
+    return result
+
+
+def _uneven(values: Floats) -> Bools:
+    """(T,) which triangles have several of the (T, 3, 3) values at their corners."""
+    result: Bools = (values != values[:, :1]).any(axis=(1, 2))
+    return result
+
+
+def _interpolate(sight: Sight, pixel: Ints, triangles: Triangles, values: Floats) -> Floats:
+    """(n, 3) of pixels between the (T, 3, 3) values of corners; of a triangle without area that of
+    its first corner."""
+    triangle = sight.triangle[pixel]
     corner, normal = triangles.corner[triangle], triangles.normal[triangle]
     _, _, at = _intersections(sight, pixel, triangles)
     first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
@@ -51,12 +73,10 @@ def show_colors(
     weight = np.zeros((len(pixel), 3))
     for k, sides in (1, (at, second)), (2, (first, at)):
         part = np.einsum("ij,ij->i", cross(*sides), normal)
-        # One without area has the colour of its first corner.
         np.divide(part, whole, out=weight[:, k], where=whole > 0)
     np.clip(weight, 0, 1, out=weight)
     weight[:, 0] = 1 - weight[:, 1] - weight[:, 2]
-    interpolated, mean = np.einsum("nk,nkj->nj", weight, color), color.mean(axis=1)
-    shown[pixel] *= np.divide(interpolated, mean, out=np.zeros_like(interpolated), where=mean > 0)
+    return np.asarray(np.einsum("nk,nkj->nj", weight, values[triangle]))
 
 
 def _intersections(

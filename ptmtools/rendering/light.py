@@ -1,4 +1,4 @@
-"""Light of pictures: what shows without light, and the distant lamp and ambient light of lit ones.
+"""Light of pictures without baked light: what shows, and a distant lamp with ambient light.
 
 The lamp wraps around objects (half Lambert, squared), so relief is visible on all sides of a
 statue. It multiplies sRGB values, like the rest of the simulator.
@@ -16,7 +16,8 @@ from ptmtools.output.served import Served
 
 #: Colour of the sky, 0 to 255, as on the web page.
 SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
-#: Least share of their colour that surfaces without texture have, and such with baked light.
+#: Least share of their colour that surfaces without texture and light show, and in buildings that
+#: have light.
 GLOW, LIT_GLOW = 0.25, 0.7
 #: Share of ambient light, and unit vector towards the lamp.
 AMBIENT = 0.3

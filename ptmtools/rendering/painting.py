@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.output.representation import representations_in
 from ptmtools.output.served import Served
-from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress
 from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.kernels import shade
-from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY, lamps
+from ptmtools.rendering.light import SKY, lamps
 from ptmtools.rendering.normal_maps import show_bumps, show_relief
 from ptmtools.rendering.previews import Texels
 from ptmtools.rendering.pyramids import alpha_of, read_levels, read_pyramids
-from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels, triangles_of
-from ptmtools.scene.colors import to_srgb
+from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels
+from ptmtools.rendering.tone import LitSurfaces, Tone
 
 
 class ObjectPainter(Protocol):
@@ -39,12 +38,14 @@ class SurfacePainter:
     """The surfaces of a database. Each texture is decoded once: by `alpha`, or by `load`, which
     comes after that and before `colors`."""
 
-    def __init__(self, served: Served, *, max_side: int, lit: bool, progress: Progress) -> None:
-        """``max_side``: of the levels, 0 for all. ``lit``: by a lamp, instead of baked light."""
+    def __init__(
+        self, served: Served, tone: Tone | None, *, max_side: int, lit: bool, progress: Progress
+    ) -> None:
+        """``tone``: of baked light, if there is any. ``max_side``: of the levels, 0 for all.
+        ``lit``: by a lamp, instead of baked light."""
         self._served, self._surfaces, self._lit = served, served.surfaces, lit
-        self._triangles = triangles_of(served.surfaces)
-        self._light = None if lit else served.surfaces.light
-        self._lightmapped = None if self._light is None else triangles_of(self._light)
+        self._tone, self._light = tone, LitSurfaces(served)
+        self._triangles = self._light.triangles
         self._max_side, self._progress = max_side, progress
         self._loaded = np.ones(served.cell_count, dtype=np.bool_)
         #: Textures that were decoded for their alpha, and that.
@@ -76,8 +77,8 @@ class SurfacePainter:
     def load(self, *triangles: NDArray[np.integer]) -> None:
         """Decodes the textures of all triangles, -1 for none, that `colors` will be asked for."""
         maps = [self._surfaces.texture]
-        if self._light is not None:
-            maps.append(self._light.texture)
+        if self._light.lightmaps:
+            maps.append(self._light.lightmaps.texture)
         if self._lit and self._surfaces.relief:
             maps.append(self._surfaces.relief.number)
         if self._surfaces.bumps:
@@ -99,7 +100,7 @@ class SurfacePainter:
             ]
 
     def colors(self, sight: Sight) -> Floats:
-        """(n, 3) colours of pixels, 0 to 255; of the sky where they show nothing."""
+        """(n, 3) colours of pixels, 0 to 255; of the background where they show nothing."""
         surfaces, triangles = self._surfaces, self._triangles
         shows, loaded, column = self._shows, self._loaded, self._column
         shown = np.empty((len(sight.ray), 3))
@@ -108,19 +109,18 @@ class SurfacePainter:
             for painter in self._painters:
                 painter.paint(sight, triangles, self._lamps, loaded, shown)
             show_relief(sight, surfaces, shows, loaded, column, self._lamps, shown)
+            show_colors(sight, triangles, surfaces.vertex_colors, shown)
+            shown[sight.triangle < 0] = SKY
         else:
-            _shade_plain(sight, triangles, self._light, shown)
+            self._light.show(sight, self._tone, self._codes, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)
-        show_colors(sight, triangles, surfaces.vertex_colors, shown)
-        light = self._lightmapped
-        if light is not None:
-            linear = np.empty_like(shown)
-            shade(sight, light, shows, loaded, column, linear)
-            mapped = np.flatnonzero(sight.triangle >= 0)
-            mapped = mapped[light.texture[sight.triangle[mapped]] >= 0]
-            shown[mapped] *= to_srgb(linear[mapped] / 255)
-        shown[sight.triangle < 0] = SKY
         return shown
+
+    def _codes(self, sight: Sight, maps: Triangles) -> Floats:
+        """(n, 3) of lightmaps, 0 to 255."""
+        result = np.empty((len(sight.ray), 3))
+        shade(sight, maps, self._shows, self._loaded, self._column, result)
+        return result
 
     def _read_alpha(self, texture: int) -> Shows | None:
         rows = self._served.index["textures"]
@@ -137,16 +137,3 @@ class SurfacePainter:
             return column
         within = (size.max(axis=2) <= self._max_side) & (size[:, :, 0] > 0)
         return np.asarray(np.minimum(np.maximum(within.sum(axis=1), 1), column))
-
-
-def _shade_plain(sight: Sight, triangles: Triangles, light: Surfaces | None, shown: Floats) -> None:
-    """Multiplies the colours of surfaces without texture by the cosine to the viewer, less where
-    light is baked: in lightmaps, or in the colours of vertices."""
-    plain = np.flatnonzero(sight.triangle >= 0)
-    plain = plain[triangles.texture[sight.triangle[plain]] < 0]
-    glow = GLOW if light is None else LIT_GLOW
-    normal, ray = triangles.normal[sight.triangle[plain]], sight.ray[plain]
-    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    along = np.abs(np.einsum("ij,ij->i", normal, ray))
-    facing = np.divide(along, length, out=np.zeros(len(along)), where=length > 0)
-    shown[plain] *= (glow + (1 - glow) * facing)[:, None]

@@ -26,14 +26,13 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import map_in_order
-from ptmtools.rendering.footprints import detail_of_pixels, footprints, show_colors
+from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.layers import Layer, Layers, blend, transparent_of
-from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.previews import read_preview
 from ptmtools.rendering.pyramids import in_colors
 from ptmtools.rendering.rays import Caster, RayCamera
-from ptmtools.rendering.records import Sight, Triangles, triangles_of
-from ptmtools.scene.colors import to_srgb
+from ptmtools.rendering.records import Sight, Triangles
+from ptmtools.rendering.tone import LitSurfaces, Tone, tone_at
 from ptmtools.site.catalogue import PICTURE
 from ptmtools.texture.detail import with_offset
 from ptmtools.texture.model import Limits
@@ -94,11 +93,12 @@ def pictures_of(
 
 @dataclass(frozen=True)
 class _View:
-    """The surfaces of a picture, and the layers before them."""
+    """The surfaces of a picture, the layers before them, and the display of their light."""
 
     kind: PictureKind
     sight: Sight
     layers: Sequence[Layer]
+    tone: Tone | None
 
     def triangles(self) -> Ints:
         """Those of both, each once, with -1 where it shows none."""
@@ -129,9 +129,8 @@ class _Scene:
 
     def __init__(self, served: Served) -> None:
         surfaces = served.surfaces
-        self._served, self._triangles = served, triangles_of(surfaces)
-        self._light = None if surfaces.light is None else triangles_of(surfaces.light)
-        self._vertex_colors = surfaces.vertex_colors
+        self._served, self._light = served, LitSurfaces(served)
+        self._triangles = self._light.triangles
         self._caster, self._layers = Caster(surfaces, transparent_of(surfaces)), Layers(surfaces)
 
     def draw(self, views: Sequence[tuple[PictureKind, Mapping[str, Any]]]) -> Iterator[bytes]:
@@ -139,7 +138,7 @@ class _Scene:
         textures = _Textures(self._served, max(kind.finest for kind, _ in views))
         frames = [self._view(kind, view, textures) for kind, view in views]
         shown = np.unique(np.concatenate([frame.triangles() for frame in frames]))
-        meshes = [mesh for mesh in (self._triangles, self._light) if mesh]
+        meshes = [mesh for mesh in (self._triangles, self._light.lightmaps) if mesh]
         numbers = (mesh.texture[shown[shown >= 0]].tolist() for mesh in meshes)
         textures.read({number for group in numbers for number in group} - {-1})
         yield from map_in_order(partial(self._jpeg, textures), frames, _THREADS)
@@ -147,16 +146,21 @@ class _Scene:
     def _view(self, kind: PictureKind, view: Mapping[str, Any], textures: _Textures) -> _View:
         sight = _look(self._caster, kind.size, view)
         sight, layers = self._layers.split(sight, partial(_alpha, self._triangles, textures))
-        return _View(kind, sight, layers)
+        tone = tone_at(self._served, sight.eye, view.get("cell"))
+        return _View(kind, sight, layers, tone)
 
     def _jpeg(self, textures: _Textures, view: _View) -> bytes:
-        colors = self._colors(textures, view.sight)
-        blend(view.layers, view.sight, partial(self._colors, textures), colors)
+        paint = partial(self._colors, textures, view.tone)
+        colors = paint(view.sight)
+        blend(view.layers, view.sight, paint, colors)
         return jpeg(colors, view.kind.size, view.kind.most)
 
-    def _colors(self, textures: _Textures, sight: Sight) -> Floats:
-        colors = _colors(sight, self._triangles, self._light, textures)
-        show_colors(sight, self._triangles, self._vertex_colors, colors)
+    def _colors(self, textures: _Textures, tone: Tone | None, sight: Sight) -> Floats:
+        """(n, 3) colours of the rays, 0 to 255."""
+        colors = _texels(textures, sight, self._triangles)
+        hit = np.flatnonzero(sight.triangle >= 0)
+        colors[hit] *= self._triangles.color[sight.triangle[hit]]
+        self._light.show(sight, tone, partial(_texels, textures), colors)
         return colors
 
 
@@ -212,38 +216,16 @@ def _with_offsets(row: Mapping[str, Any], levels: Levels) -> Levels:
     return [with_offset(*pair) for pair in zip(levels, offsets_of(row), strict=False)]
 
 
-def _colors(
-    sight: Sight, triangles: Triangles, light: Triangles | None, textures: Mapping[int, Levels]
-) -> Floats:
-    """(n, 3) colours of the rays, 0 to 255; ``light``: the triangles with lightmaps as textures."""
-    shown = np.empty((len(sight.ray), 3))
-    shown[:] = SKY
+def _texels(textures: Mapping[int, Levels], sight: Sight, triangles: Triangles) -> Floats:
+    """(n, 3) texels that pixels show, 0 to 255; 255 without a texture."""
+    colors = np.full((len(sight.ray), 3), 255.0)
     hit = np.flatnonzero(sight.triangle >= 0)
-    triangle, ray = sight.triangle[hit], sight.ray[hit]
-    normal = triangles.normal[triangle]
-    facing = np.einsum("ij,ij->i", normal, ray)
-    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
-    glow = np.full(len(hit), GLOW if light is None else LIT_GLOW)
-    glow += (1 - glow) * np.abs(facing) / np.maximum(length, 1e-300)
-    lit = np.repeat(255.0 * glow[:, None], 3, axis=1)
-    _sample(lit, sight, hit, triangles, textures)
-    if light is not None:
-        lightmap = np.full_like(lit, 255.0)
-        _sample(lightmap, sight, hit, light, textures)
-        lit *= to_srgb(lightmap / 255)
-    shown[hit] = lit * triangles.color[triangle]
-    return shown
-
-
-def _sample(
-    colors: Floats, sight: Sight, hit: Ints, triangles: Triangles, textures: Mapping[int, Levels]
-) -> None:
-    """Writes the colours of the ``hit`` pixels that show a texture."""
     texture = triangles.texture[sight.triangle[hit]]
     for number, levels in textures.items():
-        rows = np.flatnonzero(texture == number)
+        rows = hit[texture == number]
         if len(rows):
-            colors[rows] = _sample_texels(sight, hit[rows], triangles, levels)[:, :3]
+            colors[rows] = _sample_texels(sight, rows, triangles, levels)[:, :3]
+    return colors
 
 
 def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:

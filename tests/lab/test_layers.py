@@ -174,7 +174,7 @@ def test_light_falls_with_the_angle() -> None:
     """On layers without texture, as on surfaces."""
     surfaces = panes(PANES[:1])
     served: Any = SimpleNamespace(surfaces=surfaces, cell_count=1, index={"textures": []})
-    painter = SurfacePainter(served, max_side=0, lit=False, progress=silent)
+    painter = SurfacePainter(served, None, max_side=0, lit=False, progress=silent)
     sight = Caster(surfaces).look(RayCamera(5, 5, 1.2, 1.0), np.zeros(3), AHEAD)
     sight, layers = Layers(surfaces).split(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))

@@ -1,0 +1,203 @@
+"""Display of baked light: a lit surface has a linear radiance, which exposure and tone curve bring
+to the screen (docs/formats/hints.md, Colours).
+
+A texel of a lightmap is a code of the logarithm of light, c of 0 to 255: `light` is
+white · 2^(stops · (c / 255 − 1)), and at vertices the light is in their colours, as a share of
+white. The radiance of the surface is base · light, with the linear product of texel, factor and
+colour of the vertex as its base.
+
+The curve "neutral" is Khronos PBR Neutral (https://github.com/KhronosGroup/ToneMapping) without its
+offset of 0.04, which makes up for reflections. It leaves radiance up to 0.8 as it is, so that
+colours stay those of the model; what is brighter is compressed and fades to white.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.output.served import Served
+from ptmtools.output.surfaces import Surfaces
+from ptmtools.rendering.footprints import corner_values, show_colors
+from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
+from ptmtools.rendering.records import Sight, Triangles, triangles_of
+from ptmtools.scene.colors import to_linear, to_srgb
+
+#: Greatest component of radiance that the curve keeps, and how fast brighter colours fade to white.
+SHOULDER, FADING = 0.8, 0.15
+#: Sine of the angle to the horizon at which the background is all sky, or all ground below it.
+HORIZON = 0.02
+
+#: (n, 3) of the pixels of a sight in lightmaps, the textures of triangles, 0 to 255; 255 without.
+Codes = Callable[[Sight, Triangles], Floats]
+
+
+@dataclass(frozen=True)
+class Tone:
+    """How a building with light is displayed to an eye.
+
+    Attributes
+    ----------
+    stops: powers of two from code 0 to code 255. exposure: factor of radiance.
+    toned: whether the tone curve applies; else radiance is clipped at 1.
+    background: (2, 3) radiance of ground and sky; None: the background is `SKY`.
+    """
+
+    stops: float
+    exposure: float
+    toned: bool
+    background: Floats | None
+
+    def light(self, white: Floats, codes: Floats) -> Floats:
+        """(n, 3) irradiance / π of (n, 3) codes, 0 to 255, and (n,) lights of the greatest code."""
+        scale = np.exp2((codes / 255 - 1) * self.stops)
+        return np.asarray(white[:, None] * scale)
+
+    def display(self, radiance: Floats) -> Floats:
+        """(n, 3) colours, 0 to 255, of linear (n, 3) radiance."""
+        exposed = radiance * self.exposure
+        return 255 * to_srgb(neutral(exposed) if self.toned else exposed)
+
+    def background_colors(self, ray: Floats) -> Floats:
+        """(n, 3) colours of the background, 0 to 255, along (n, 3) rays of any length, Y up."""
+        if self.background is None:
+            return np.tile(SKY, (len(ray), 1))
+        height = ray[:, 1] / np.linalg.norm(ray, axis=1)
+        share = np.clip((height / HORIZON + 1) / 2, 0, 1)
+        share = (share * share * (3 - 2 * share))[:, None]
+        ground, sky = self.background
+        return self.display(ground * (1 - share) + sky * share)
+
+
+def tone_of(index: Mapping[str, Any], cell: int = -1) -> Tone | None:
+    """The display of a building to an eye in a cell, -1 for none; None of one without light.
+    ``index``: `hints.json`."""
+    head = index.get("light")
+    if head is None:
+        return None
+    exposure, background = 1.0, None
+    if toned := head["tone"] == "neutral":
+        if cell >= 0:
+            exposure = float(index["cells"][cell].get("exposure", 1.0))
+        if "sky" in head and "ground" in head:
+            background = np.array([head["ground"], head["sky"]], np.float64)
+    return Tone(float(head["stops"]), exposure, toned, background)
+
+
+def tone_at(served: Served, eye: Floats, cell: int | None = None) -> Tone | None:
+    """The display of a building to an eye (3,), in metres; ``cell``: of it, if that is known."""
+    if "light" not in served.index:
+        return None
+    if cell is None:
+        (cell,) = served.locator.cells_along(eye[None]).tolist()
+    return tone_of(served.index, cell)
+
+
+def neutral(radiance: Floats) -> Floats:
+    """(n, 3) linear light of the screen, 0 to 1, of (n, 3) radiance from 0 on."""
+    result, peak = radiance.copy(), radiance.max(axis=1)
+    bright = np.flatnonzero(peak > SHOULDER)
+    peak, room = peak[bright, None], 1 - SHOULDER
+    compressed = 1 - room * room / (peak + room - SHOULDER)
+    fading = 1 - 1 / (FADING * (peak - compressed) + 1)
+    color = result[bright] * (compressed / peak)
+    result[bright] = color + (compressed - color) * fading
+    return result
+
+
+class LitSurfaces:
+    """The lit surfaces among all of a database.
+
+    Attributes
+    ----------
+    triangles: all; lit ones are white, so that they are sampled as their texels are.
+    lightmaps: all with lightmaps as their textures; None if there are none.
+    """
+
+    def __init__(self, served: Served) -> None:
+        surfaces, self._white = served.surfaces, _whites(served)
+        self.triangles, self._vertex_colors = triangles_of(surfaces), surfaces.vertex_colors
+        self.lightmaps: Triangles | None = None
+        if not (lit := self._white > 0).any():
+            return
+        if light := surfaces.light:
+            self.lightmaps = triangles_of(light)
+        #: (T, 3) linear factors of the texels; (T, 3, 3) of the corners, unlit ones are white.
+        self._factor = to_linear(_factors(surfaces))
+        self._corner_colors: Floats | None = None
+        if (colors := surfaces.vertex_colors) is not None:
+            self._corner_colors = np.ones_like(colors)
+            self._corner_colors[lit] = to_linear(colors[lit])
+            self._vertex_colors = np.where(lit[:, None, None], 1.0, colors)
+        color = np.where(lit[:, None], 1.0, surfaces.color)
+        self.triangles = self.triangles._replace(color=color)
+
+    def show(self, sight: Sight, tone: Tone | None, codes: Codes, shown: Floats) -> None:
+        """Turns pixels ``shown`` (n, 3) from the texels, or white, times the colours of `triangles`
+        to what is displayed; those of the background as well. All are 0 to 255."""
+        hit = np.flatnonzero(sight.triangle >= 0)
+        lit = self._white[sight.triangle[hit]] > 0
+        self._show_plain(sight, hit[~lit], GLOW if tone is None else LIT_GLOW, shown)
+        if tone:
+            self._show_light(sight, hit[lit], tone, codes, shown)
+        show_colors(sight, self.triangles, self._vertex_colors, shown)
+        outside = np.flatnonzero(sight.triangle < 0)
+        shown[outside] = tone.background_colors(sight.ray[outside]) if tone else SKY
+
+    def _show_plain(self, sight: Sight, pixel: Ints, glow: float, shown: Floats) -> None:
+        """Multiplies those of some pixels without texture by the cosine to the viewer, and some
+        ``glow``."""
+        pixel = pixel[self.triangles.texture[sight.triangle[pixel]] < 0]
+        normal, ray = self.triangles.normal[sight.triangle[pixel]], sight.ray[pixel]
+        length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
+        along = np.abs(np.einsum("ij,ij->i", normal, ray))
+        facing = np.divide(along, length, out=np.zeros(len(along)), where=length > 0)
+        shown[pixel] *= (glow + (1 - glow) * facing)[:, None]
+
+    def _show_light(
+        self, sight: Sight, pixel: Ints, tone: Tone, codes: Codes, shown: Floats
+    ) -> None:
+        triangle = sight.triangle[pixel]
+        base = to_linear(shown[pixel] / 255) * self._factor[triangle]
+        if self._corner_colors is not None:
+            base *= corner_values(sight, pixel, self.triangles, self._corner_colors)
+        code = np.full((len(pixel), 3), 255.0)
+        if self.lightmaps is not None:
+            part = sight._replace(triangle=triangle, ray=sight.ray[pixel])
+            code = codes(part, self.lightmaps)
+        shown[pixel] = tone.display(base * tone.light(self._white[triangle], code))
+
+
+def show_vertex_light(served: Served) -> Served:
+    """The database with light at vertices as it is displayed on a white surface, times the colours;
+    none of its surfaces is lit. For pictures that compute no light."""
+    surfaces, white, tone = served.surfaces, _whites(served), tone_of(served.index)
+    at_vertices = white > 0 if surfaces.lightmap is None else (white > 0) & (surfaces.lightmap < 0)
+    color, colors = surfaces.color.copy(), surfaces.vertex_colors
+    if tone and at_vertices.any():
+        colors = np.ones((len(color), 3, 3)) if colors is None else colors.copy()
+        light = white[at_vertices, None, None] * to_linear(colors[at_vertices])
+        colors[at_vertices] = tone.display(light.reshape(-1, 3)).reshape(light.shape) / 255
+        color[at_vertices] = _factors(surfaces)[at_vertices] * colors[at_vertices].mean(axis=1)
+    unlit = replace(surfaces, white=None, color=color, vertex_colors=colors)
+    return replace(served, surfaces=unlit)
+
+
+def _whites(served: Served) -> Floats:
+    """(T,) light of the greatest code, 0 of triangles that are not lit."""
+    white = served.surfaces.white
+    if white is None or "light" not in served.index:
+        return np.zeros(len(served.surfaces.corner))
+    return white
+
+
+def _factors(surfaces: Surfaces) -> Floats:
+    """(T, 3) the colours of triangles without those of their corners, encoded as sRGB."""
+    if surfaces.vertex_colors is None:
+        return surfaces.color
+    mean = surfaces.vertex_colors.mean(axis=1)
+    return np.asarray(np.divide(surfaces.color, mean, out=np.ones_like(mean), where=mean > 0))
