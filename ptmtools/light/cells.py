@@ -1,18 +1,16 @@
 """Bakes the light of the cells: one task for each cell.
 
-The surfaces of a cell share one lightmap of linear light. Objects of thousands of small
-triangles have their light at vertices, as colours: an atlas would have a chart for each few of
-them, and their coarser meshes take over colours, but no charts. So have objects that
-``--apo`` replaces: their second coordinates are those of their relief.
+The surfaces of a cell share one lightmap. Objects of thousands of small triangles have their light
+at vertices, as colours: an atlas would have a chart for each few of them, and their coarser meshes
+take over colours, but no charts. So have objects that ``--apo`` replaces: their second coordinates
+are those of their relief.
 
-The light is that of the model's own lightmaps, or ambient obscurance (`light.occlusion`) with that
-of lamps and the sky (`light.mixing`). Of ambient light, a ray that meets nothing within reach
-counts whole. More of it comes from above than from below, so that forms show where nothing is near:
-a white statue in a white room. Indoors, all surfaces have something within reach in many
-directions; so that pictures keep about their colours, all light is brightened (`expose`).
+The light is that of the model's own lightmaps, or that of the building (`light.building`): what the
+sky and surfaces send, without its grain, and what lamps send. Texels that something covers, as a
+wall by a picture, take that of their neighbours.
 
 A piece that shows both sides has the light of the side on which its cell lies. If that is either,
-as of a screen within a room, the more open side counts.
+as of a screen within a room, the side with more light counts.
 """
 
 from __future__ import annotations
@@ -27,30 +25,25 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.light.atlas import FILLED, unwrap
-from ptmtools.light.lightmap import SMOOTH, bake, vertex_light
-from ptmtools.light.looks import SMALLEST, PaintedLight, RayLight, open_sides, planes
-from ptmtools.light.mixing import LightMix, MixedLight
+from ptmtools.light.building import BuildingLight
+from ptmtools.light.lightmap import SMOOTH, TexelGrid, vertex_light
+from ptmtools.light.looks import SMALLEST, Look, PaintedLight, planes
 from ptmtools.light.model import CellSurfaces, light_codes
-from ptmtools.light.occlusion import Occluders, normals
-from ptmtools.scene.colors import encode_srgb
+from ptmtools.light.occlusion import normals
+from ptmtools.scene.colors import encode_srgb, luminance
 
 if TYPE_CHECKING:
     from ptmtools.light.options import LightOptions
 
-#: Share of the light from straight above that comes from straight below is 1 less this.
-ABOVE = 0.4
-#: Share of the light that comes everywhere, by reflection, and the factor of all light, which is
-#: then cut off at 1.
-REFLECTED, EXPOSURE = 0.15, 1.05
-#: The light that shows as white.
-WHITE = (1 / EXPOSURE - REFLECTED) / (1 - REFLECTED)
-#: Rays from a point of a face with light at vertices, of those from a texel. A vertex has the light
-#: of many points: half of the rays add up to 1.1 of 255 to the error, for half of the time. (Half
-#: of the points took as long; the error was 0.2 less in an apartment, 0.5 more in a cave.)
-_AT_VERTICES = 0.5
-#: Texels with less light are covered, as a wall by a picture, and take that of their neighbours: a
-#: texel is wider than the gap that it would darken.
-COVERED = 0.03
+#: Rays from a point of a face with light at vertices, of those from a texel: a vertex has the light
+#: of many points.
+_AT_VERTICES = 0.25
+#: The least light of the model's own lightmaps.
+_PAINTED = 0.15
+#: Differences of light by this share of the usual one do not show.
+_LEAST = 0.01
+#: The share of a cell's light that its white is not less than.
+_WHITE = 0.995
 #: The side of a lightmap is a multiple of this, so that four of its levels halve exactly,
 _MULTIPLE = 16
 #: and at most this, texels.
@@ -58,16 +51,13 @@ _LARGEST = 2048
 #: Texels between charts: coordinates are rounded by up to a tenth of a texel in GLBs, and would
 #: read the edge of another chart, a thin dark line.
 _PADDING = 1
-#: By default, lightmaps are to have at most this share of the bytes of the model's images. Fewer
-#: texels to the metre are tried before there is no light at all: an office with one image of 60 kB
-#: would get lightmaps of 390 kB.
-SHARE = 0.1
-#: The least share of the texels to the metre.
-LEAST = 0.5
+#: By default, lightmaps are to have at most this share of the bytes of the model's images, or this
+#: number of bytes, whichever is more. They have fewer texels to the metre if necessary.
+SHARE, BYTES = 0.1, 400_000
 #: Texels of the smallest lightmap: a building with fewer shows no light, but is of another scale.
 _SMALLEST = 16**2
-#: Bytes of a texel (0.24 in a hospital, 0.25 in an office, 0.38 in a museum).
-_TEXEL_BYTES = 0.3
+#: Bytes of a texel.
+_TEXEL_BYTES = 0.12
 
 
 @dataclass(frozen=True)
@@ -76,7 +66,10 @@ class CellLight:
 
     Attributes
     ----------
-    texels: (side, side) uint8 linear light, of 255; None without a lightmap.
+    white: the light of which texels and `vertex` are shares.
+    texels: (side, side, 3) uint8 codes; None without a lightmap.
+    radiance: the mean of the logarithms of the luminance that its surfaces reflect, and their area,
+        m²; 0 without lit surfaces.
     crowded: whether neighbours in the lightmap run into each other.
     density: texels to the metre, of those that were asked for; 1 without a lightmap.
     """
@@ -85,7 +78,9 @@ class CellLight:
     lit: Bools
     uv: NDArray[np.float32]
     vertex: NDArray[np.uint8]
+    white: float
     texels: NDArray[np.uint8] | None
+    radiance: tuple[float, float]
     crowded: bool
     density: float = 1.0
 
@@ -96,35 +91,71 @@ class LightBaking:
 
     Attributes
     ----------
-    around, options: what occludes, and the options.
-    mix: lamps and the sky.
-    painted: the light of the model's own lightmaps, for the faces of the scene, instead of rays.
+    options: of the stage.
+    building: the light of the building; None if the model has its own,
+    painted: for the faces of the scene.
+    reflectance: (T,) luminance of the mean colour of each face of the scene.
     """
 
-    around: Occluders
     options: LightOptions
-    mix: LightMix = LightMix()  # noqa: RUF009 - a frozen value
-    painted: PaintedLight | None = None
+    building: BuildingLight | None
+    painted: PaintedLight | None
+    reflectance: Singles
 
     def light(self, piece: CellSurfaces) -> CellLight:
         """The light of a cell. Raises MissingComponentError PTM-M100: xatlas is not installed."""
         count = int(piece.shape[-1]) + 1 if len(piece.shape) else 0
         dense, flat = piece.dense & ~piece.glass, ~piece.dense & ~piece.glass
         corner = piece.corner.astype(np.float64)
-        mapped = np.zeros(count, np.bool_)
+        lit, mapped = np.zeros((2, count), np.bool_)
+        lit[piece.shape[~piece.glass]] = True
         mapped[piece.shape[flat]] = True
-        shown = np.zeros(count, np.bool_)
-        shown[piece.shape[~piece.glass]] = True
-        uv = np.zeros((len(corner), 3, 2), np.float32)
-        vertex = np.full((len(corner), 3, 3), 255, np.uint8)
-        side = self.sides(corner, piece.side)
+        side = self.sides(corner, piece)
+        vertex = np.zeros((len(corner), 3, 3), np.float32)
         for rows in _objects(piece.object, dense):
-            look = self.look(corner[rows], side[rows], piece.face[rows], _AT_VERTICES)
-            grey = self._encode(vertex_light(look, corner[rows], normals(corner[rows])))
-            vertex[rows] = encode_srgb(grey / 255.0)[..., None]
-        if not flat.any():
-            return CellLight(mapped, shown, uv, vertex, None, False)
+            look = self._look(piece, corner, side, rows, _AT_VERTICES)
+            vertex[rows] = vertex_light(look, corner[rows], normals(corner[rows]))
+        uv, texels, rest = np.zeros((len(corner), 3, 2), np.float32), None, (False, 1.0)
         rows = np.flatnonzero(flat)
+        samples = [vertex[dense].mean(axis=1)]
+        weights = [areas(corner[dense])]
+        faces = [piece.face[dense]]
+        if len(rows):
+            grid, uv[rows], rest = self._grid(piece, corner, side, rows)
+            light = self._texels(piece, corner, side, rows, grid)
+            texels = grid.fill(light)
+            samples.append(np.nan_to_num(light))
+            faces.append(piece.face[rows[grid.face]])
+            area = areas(corner[rows]).sum() / max(len(light), 1)
+            weights.append(np.where(np.isnan(light[:, 0]), 0.0, area))
+        sample, weight = np.concatenate(samples), np.concatenate(weights)
+        white = self._white(sample, weight)
+        radiance = luminance(sample.astype(np.float64)) * self.reflectance[np.concatenate(faces)]
+        shares = encode_srgb(vertex.astype(np.float64) / white)
+        return CellLight(
+            mapped,
+            lit,
+            uv,
+            np.where(dense[:, None, None], shares, np.uint8(255)),
+            white,
+            None if texels is None else light_codes(texels, white),
+            _log_mean(radiance, weight),
+            *rest,
+        )
+
+    def sides(self, corner: Floats, piece: CellSurfaces) -> Floats:
+        """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back."""
+        either = (piece.side == 0) & ~piece.glass
+        result = np.where(piece.side < 0, -1.0, 1.0)
+        if either.any() and self.building is not None:
+            result[either] = self.building.brighter_sides(corner[either])
+        return result
+
+    def _grid(
+        self, piece: CellSurfaces, corner: Floats, side: Floats, rows: Ints
+    ) -> tuple[TexelGrid, Floats, tuple[bool, float]]:
+        """The texels of the lightmap of some pieces, their coordinates in it, and the last two
+        fields of `CellLight`."""
         points, triangles = np.unique(
             piece.corner[rows].reshape(-1, 3), axis=0, return_inverse=True
         )
@@ -139,53 +170,60 @@ class LightBaking:
             padding=_PADDING,
             group=_groups(corner[rows], side[rows]),
         )
-        look = self.look(corner[rows], side[rows], piece.face[rows])
         size = atlas.side or sizes[-1]
-        least = COVERED if self.painted is None else 0.0
-        (lit,) = bake(look, corner[rows], atlas, look.grain, (size,), least=least)
-        uv[rows] = atlas.uv
         texels_a_metre = size * math.sqrt(plane_areas(atlas.uv).sum() / max(area.sum(), SMALLEST))
         reached = texels_a_metre / max(density, SMALLEST)
-        texels = np.repeat(light_codes(self._encode(lit.value) / 255.0, 1.0)[..., None], 3, axis=2)
-        return CellLight(mapped, shown, uv, vertex, texels, atlas.side is None, min(reached, 1.0))
+        grid = TexelGrid.of_atlas(corner[rows], atlas, size)
+        return grid, atlas.uv, (atlas.side is None, min(reached, 1.0))
 
-    def sides(self, corner: Floats, side: NDArray[np.int8]) -> Floats:
-        """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back; ``side``: see
-        `CellSurfaces`."""
-        either = side == 0
-        result = np.where(side < 0, -1.0, 1.0)
-        if either.any() and self.painted is None:
-            reach = self.options.light_reach
-            result[either] = open_sides(
-                self.around, corner[either], either[either], reach, indoors=True
-            )
-        return result
+    def _texels(
+        self, piece: CellSurfaces, corner: Floats, side: Floats, rows: Ints, grid: TexelGrid
+    ) -> Singles:
+        """(n, 3) the light of the texels; NaN where something covers them."""
+        point, turn = grid.points(), grid.turns()
+        if self.building is None:
+            look = self._look(piece, corner, side, rows, 1.0)
+            return np.repeat(look(grid.face, point, turn), 3, axis=1)
+        near = 0.5 / self.options.light_density
+        lit = self.building.look(corner[rows], side[rows], self.options.light_samples, near)
+        light, variance = lit.indirect(grid.face, point, turn)
+        indirect = grid.smooth(light, variance, _LEAST * self.building.usual)
+        return np.asarray(indirect + lit.direct(grid.face, point, turn), np.float32)
 
-    def look(
-        self, corner: Floats, side: Floats, face: Ints, rays: float = 1.0
-    ) -> RayLight | MixedLight | PaintedLight:
-        """The light of (n, 3, 3) faces on their (n,) `sides`, by this share of the rays of the
-        options; (n,) ``face``: see `CellSurfaces`."""
+    def _look(
+        self, piece: CellSurfaces, corner: Floats, side: Floats, rows: Ints, rays: float
+    ) -> Look:
+        """The light of some pieces, by this share of the rays of the options."""
         if self.painted is not None:
-            return replace(self.painted, source=self.painted.source[face])
-        samples, reach = math.ceil(rays * self.options.light_samples), self.options.light_reach
-        return self.mix.look(RayLight(self.around, corner, samples, reach, side=side, above=ABOVE))
+            return _brightened(replace(self.painted, source=self.painted.source[piece.face[rows]]))
+        assert self.building is not None
+        samples = math.ceil(rays * self.options.light_samples)
+        return self.building.look(corner[rows], side[rows], samples, 0.0)
 
-    def _encode(self, light: Floats | Singles) -> NDArray[np.uint8]:
-        """Light in 255ths: as exposed, or that of the model."""
-        if self.painted is None:
-            return encode(light)
-        return np.asarray(np.rint(255 * np.clip(light, REFLECTED, 1.0)), np.uint8)
+    def _white(self, light: Singles, weight: Floats) -> float:
+        """The white of a cell with this (n, 3) light."""
+        if self.building is None:
+            return 1.0
+        bright = light[weight > 0].max(axis=1, initial=0.0)
+        white = float(np.quantile(bright, _WHITE)) if len(bright) else 0.0
+        # Three digits, as in GLBs.
+        return float(f"{white:.3g}") if white > 0 else self.building.usual
 
 
-def expose(light: Floats | Singles) -> Floats:
-    """Light with that by reflection, brightened, from 0 to 1."""
-    return np.clip(EXPOSURE * (REFLECTED + (1 - REFLECTED) * light), 0.0, 1.0).astype(np.float64)
+def _brightened(painted: PaintedLight) -> Look:
+    def look(face: Ints, point: Floats, turn: Floats) -> Singles:
+        return np.maximum(painted(face, point, turn), np.float32(_PAINTED))
+
+    return look
 
 
-def encode(light: Floats | Singles) -> NDArray[np.uint8]:
-    """Light as exposed, in 255ths."""
-    return np.rint(255 * expose(light)).astype(np.uint8)
+def _log_mean(radiance: Floats, weight: Floats) -> tuple[float, float]:
+    """The mean of the logarithms of some radiance that is not 0, and its weight."""
+    weight = weight * (radiance > 0)
+    total = float(weight.sum())
+    if not total > 0:
+        return 0.0, 0.0
+    return float(weight @ np.log(np.where(radiance > 0, radiance, 1))) / total, total
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:
@@ -227,9 +265,8 @@ def expected_bytes(pieces: Sequence[CellSurfaces], density: float) -> float:
 
 def affordable_density(pieces: Sequence[CellSurfaces], density: float, images: int) -> float:
     """The texels to the metre of lightmaps beside images of a number of bytes (`round_bytes`), at
-    most ``density``; 0 if light would cost too much, or there is no surface for it."""
+    most ``density``; 0 if there is no surface for light."""
     cost = expected_bytes(pieces, density)
     if cost < _SMALLEST * _TEXEL_BYTES:
         return 0.0
-    fitting = min(1.0, math.sqrt(SHARE * images / cost))
-    return density * fitting if fitting >= LEAST else 0.0
+    return density * min(1.0, math.sqrt(max(SHARE * images, BYTES) / cost))

@@ -7,8 +7,7 @@ all lamps would send without anything between is summed, and shadow rays go to l
 in proportion to their parts of it (systematic sampling): the share that is free counts for all of
 them. So light is without grain where no lamp is half hidden.
 
-Nits, candela and lux of a model seldom fit each other or the pictures. So each kind is measured by
-its own light: 1 is the median on the surfaces that it reaches at all.
+Lamps are chosen by luminance; what of their light is free counts for each colour by itself.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from ptmtools.scene.model import Scene
 
 #: Metres of the side of a patch, and most patches of a scene, which are larger where necessary. So
 #: are the cubes in which lamps without a surface join.
-_PATCH, _MOST = 0.2, 4096
+PATCH, MOST_PATCHES = 0.2, 4096
 #: Lamps that join differ by at most this in each component of their ways and cones, in cubes of the
 #: least size, and by twice as much in those of twice the size.
 _APART = 0.1
@@ -57,6 +56,7 @@ class Lamps:
     power: (n,) luminance of patches, luminous intensity, or illuminance of a sun.
     area: (n,) m² of patches.
     cone: (n, 2) see `Lamp`.
+    color: (n, 3) linear colours of luminance 1.
     """
 
     kind: NDArray[np.uint8]
@@ -65,6 +65,7 @@ class Lamps:
     power: Floats
     area: Floats
     cone: Floats
+    color: Floats
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -73,12 +74,19 @@ class Lamps:
         """Some of them."""
         return Lamps(*(values[chosen] for values in vars(self).values()))
 
+    def groups(self) -> tuple[Bools, Bools, Bools]:
+        """(n,) which are points and spots, suns, and surfaces."""
+        return self.kind < _SUN, self.kind == _SUN, self.kind > _SUN
 
-def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
-    """The lamps of a scene; none if it has none."""
+
+def lamps_of(
+    scene: Scene, lights: Lights | None, size: float = PATCH, most: int = MOST_PATCHES
+) -> Lamps:
+    """The lamps of a scene; none if it has none. ``size``: metres of a patch of a surface, of which
+    there are at most ``most``."""
     if lights is None:
         lights = Lights.none(len(scene.materials))
-    patches = _patches(scene, lamp_luminance(scene, lights))
+    patches = _patches(scene, lamp_radiance(scene, lights), size, most)
     single = Lamps(
         np.array([KINDS.index(lamp.kind) for lamp in lights.lamps], np.uint8),
         np.array([lamp.position for lamp in lights.lamps]).reshape(-1, 3),
@@ -86,18 +94,19 @@ def lamps_of(scene: Scene, lights: Lights | None) -> Lamps:
         np.array([lamp.intensity for lamp in lights.lamps]),
         np.zeros(len(lights.lamps)),
         np.array([lamp.cone for lamp in lights.lamps]).reshape(-1, 2),
+        np.array([lamp.color for lamp in lights.lamps]).reshape(-1, 3),
     )
-    pairs = zip(vars(_merge(single)).values(), vars(patches).values(), strict=True)
+    pairs = zip(vars(_merge(single, most)).values(), vars(patches).values(), strict=True)
     return Lamps(*(np.concatenate(pair) for pair in pairs))
 
 
-def _merge(lamps: Lamps) -> Lamps:
-    """Lamps without a surface, at most `_MOST`: those of a kind in a cube with ways and cones alike
-    become one, with the sum of their powers and the means, weighted by these, of all else."""
+def _merge(lamps: Lamps, most: int) -> Lamps:
+    """Lamps without a surface, at most that number: those of a kind in a cube with ways and cones
+    alike become one, with the sum of their powers and the means, weighted by these, of all else."""
     lamps, size = lamps.only(lamps.power > 0), 1.0
-    while len(lamps) > _MOST:
+    while len(lamps) > most:
         turned, placed = lamps.kind != _POINT, lamps.kind != _SUN
-        cube = np.where(placed[:, None], lamps.place, 0) // (size * _PATCH)
+        cube = np.where(placed[:, None], lamps.place, 0) // (size * PATCH)
         shape = np.concatenate([lamps.way, lamps.cone], axis=1)
         alike = np.where(turned[:, None], shape, 0) // (size * _APART)
         _, first, group = np.unique(
@@ -115,43 +124,52 @@ def _merge_groups(lamps: Lamps, group: Ints, kind: NDArray[np.uint8]) -> Lamps:
     """One lamp of each (G,) kind for the lamps of each group."""
     power = np.bincount(group, lamps.power).astype(np.float64)
     share = lamps.power / power[group]
-    place, way, cone = (
+    place, way, cone, color = (
         np.stack([np.bincount(group, share * part) for part in value.T], axis=1).astype(np.float64)
-        for value in (lamps.place, lamps.way, lamps.cone)
+        for value in (lamps.place, lamps.way, lamps.cone, lamps.color)
     )
     long = np.linalg.norm(way, axis=1, keepdims=True)
     way = np.where(long > 0, way / np.where(long > 0, long, 1), [0.0, -1.0, 0.0])
-    return Lamps(kind, place, way, power, np.zeros(len(power)), cone)
+    return Lamps(kind, place, way, power, np.zeros(len(power)), cone, color)
 
 
-def lamp_luminance(scene: Scene, lights: Lights) -> Floats:
-    """(M,) the luminance of each material that is a lamp, 0 of the others."""
-    glow = luminance(lights.glow.astype(np.float64))
-    glow = np.where(glow >= LEAST, glow, 0.0)
+def lamp_radiance(scene: Scene, lights: Lights) -> Floats:
+    """(M, 3) what each material that is a lamp emits, 0 of the others."""
+    bright = luminance(lights.glow.astype(np.float64)) >= LEAST
+    glow = np.where(bright[:, None], lights.glow, 0.0).astype(np.float64)
     area = areas(scene.corners)
-    if area[glow[scene.triangle_material] > 0].sum() > _SHARE * area.sum():
-        return np.zeros(len(glow))
+    if area[bright[scene.triangle_material]].sum() > _SHARE * area.sum():
+        return np.zeros((len(bright), 3))
     return glow
 
 
-def _patches(scene: Scene, glow: Floats) -> Lamps:
-    faces = np.flatnonzero(glow[scene.triangle_material] > 0)
+def _patches(scene: Scene, glow: Floats, size: float, most: int) -> Lamps:
+    faces = np.flatnonzero(glow[scene.triangle_material].any(axis=1))
     corner = scene.corners[faces]
     area = areas(corner)
     total = float(area.sum())
-    count = min(_MOST, max(len(faces), math.ceil(total / _PATCH**2))) if total else 0
+    count = min(most, max(len(faces), math.ceil(total / size**2))) if total else 0
     chosen = np.zeros(0, np.int64)
     if count:
         chosen = spread_over(area, np.zeros(len(faces), np.int64), np.array([0]), count)[0]
     both = scene.two_sided[faces[chosen]]
+    radiance = glow[scene.triangle_material[faces[chosen]]]
+    power, color = shades(radiance)
     return Lamps(
         np.where(both, _BOTH, _PATCH_KIND).astype(np.uint8),
         _patch_centres(corner, chosen),
         normals(corner[chosen]),
-        glow[scene.triangle_material[faces[chosen]]],
+        power,
         np.full(count, total / max(count, 1)),
         np.ones((count, 2)),
+        color,
     )
+
+
+def shades(light: Floats) -> tuple[Floats, Floats]:
+    """(n,) the luminance of (n, 3) light, and (n, 3) its colours, of luminance 1."""
+    power = luminance(light)
+    return power, light / np.where(power > 0, power, 1)[:, None]
 
 
 def _patch_centres(corner: Floats, chosen: Ints) -> Floats:
@@ -162,43 +180,26 @@ def _patch_centres(corner: Floats, chosen: Ints) -> Floats:
     return np.asarray(points + (corner.mean(axis=1) - mean)[chosen])
 
 
-def measure_lamps(
-    around: Occluders, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
-) -> Lamps:
-    """The lamps with powers by which each kind has a median of 1 at those of (n, 3) points with
-    (n, 3) normals that it reaches; without kinds that reach none."""
-    result = []
-    for kinds in ((_POINT, _SPOT), (_SUN,), (_PATCH_KIND, _BOTH)):
-        kind_lamps = lamps.only(np.isin(lamps.kind, kinds))
-        light = direct_light(around, kind_lamps, point, normal, turn, rays)
-        if (light > 0).any():
-            usual = float(np.median(light[light > 0]))
-            result.append(Lamps(*{**vars(kind_lamps), "power": kind_lamps.power / usual}.values()))
-    if not result:
-        return lamps.only(np.zeros(0, np.int64))
-    columns = zip(*(vars(lamp_rows).values() for lamp_rows in result), strict=True)
-    return Lamps(*map(np.concatenate, columns))
-
-
-def lamps_near(lamps: Lamps, corner: Floats) -> Lamps:
-    """Those lamps, `measure_lamps`, that can matter to (T, 3, 3) faces."""
+def lamps_near(lamps: Lamps, corner: Floats, usual: float) -> Lamps:
+    """Those lamps that can matter to (T, 3, 3) faces, where all light is ``usual``."""
     low, high = corner.min(axis=(0, 1)), corner.max(axis=(0, 1))
     distance = np.linalg.norm(lamps.place - np.clip(lamps.place, low, high), axis=1)
     patch = lamps.kind >= _PATCH_KIND
     size = np.where(patch, lamps.area, 1.0)
     largest = lamps.power * size / (distance**2 + np.where(patch, size / math.pi, _NEAREST**2))
-    largest = np.where(lamps.kind == _SUN, lamps.power, largest)
+    largest = np.where(lamps.kind == _SUN, lamps.power, largest) / math.pi
     order = np.argsort(largest, kind="stable")
-    kept = np.cumsum(largest[order]) > _FEW
+    kept = np.cumsum(largest[order]) > _FEW * usual
     return lamps.only(np.sort(order[kept]))
 
 
 def direct_light(
     around: Occluders, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
 ) -> Floats:
-    """(n,) the light of lamps at (n, 3) points with (n, 3) normals, by at most ``rays`` shadow rays
-    for each point. ``turn``: (n,) shares of the way between two lamps at which choosing begins."""
-    result = np.zeros(len(point))
+    """(n, 3) the light of lamps, irradiance / pi, at (n, 3) points with (n, 3) normals, by at most
+    ``rays`` shadow rays for each point. ``turn``: (n,) shares of the way between two lamps at which
+    choosing begins."""
+    result = np.zeros((len(point), 3))
     if not len(lamps):
         return result
     step = max(1, RAYS // rays)
@@ -215,8 +216,14 @@ def direct_light(
         size = 2 * np.linalg.norm(around.points.max(axis=0) - around.points.min(axis=0), axis=-1)
         target[sun] = origin[row[sun]] - size * lamps.way[lamp[sun]]
         free = around.free(origin[row], target)
-        share = np.bincount(row, times[row, column] * free, len(origin)) / rays
-        result[part] = total * share
+        # Of each colour the part that is free: without shadows the light is exact.
+        sent = times[row, column, None] * lamps.color[lamp]
+        every, arrived = (
+            np.stack([np.bincount(row, part, len(origin)) for part in weight.T], axis=1)
+            for weight in (sent, sent * free[:, None])
+        )
+        share = np.divide(arrived, every, out=np.zeros_like(arrived), where=every > 0)
+        result[part] = total * share / math.pi
     return result
 
 
@@ -232,20 +239,25 @@ def _choose_lamps(
     power: NDArray[np.float64],
     area: NDArray[np.float64],
     cone: NDArray[np.float64],
+    color: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """(n,) the light of all lamps without shadows; (n, rays) the lamps that rays go to, and how
+    """(n, 3) the light of all lamps without shadows; (n, rays) the lamps that rays go to, and how
     many of the ``rays`` each of these stands for, 0 beyond the last."""
-    total = np.zeros(len(point))
+    total = np.zeros((len(point), 3))
     chosen = np.zeros((len(point), rays), np.int64)
     times = np.zeros((len(point), rays), np.int64)
     light = np.zeros(len(kind))
     for p in range(len(point)):
+        sum_light = 0.0
         for k in range(len(kind)):
             light[k] = _lamp_light(point, normal, p, k, kind, place, way, power, area, cone)
-            total[p] += light[k]
-        if total[p] <= 0:
+            if light[k] > 0:
+                sum_light += light[k]
+                for c in range(3):
+                    total[p, c] += light[k] * color[k, c]
+        if sum_light <= 0:
             continue
-        step = total[p] / rays
+        step = sum_light / rays
         ahead, reached, used, sent = turn[p] * step, 0.0, 0, 0
         for k in range(len(kind)):
             reached += light[k]

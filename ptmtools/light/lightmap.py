@@ -1,12 +1,13 @@
-"""The lightmaps of a mesh, in one or several sizes, and light at vertices.
+"""The lightmap of a mesh, and light at vertices.
 
 A texel has the light of the nearest point of its face, also where a look-up on a face reads it but
-no face holds its centre, as of sills thinner than a texel. The map of half the least size is
-computed texel by texel. Each larger one takes over the bilinear mean of the four texels below where
-they agree, and computes the rest: light is smooth except where surfaces meet. Computed texels are
-smoothed with neighbours on the same chart that differ by no more than the grain of the light. What
-no face reads takes the nearest value. (Smoothing over edges made files a tenth smaller, and twice
-as many points were off by a tenth.)
+no face holds its centre, as of sills thinner than a texel. What no face reads, and what is covered,
+takes the nearest value.
+
+Light by rays has grain. Each of four rounds takes the mean of 25 texels of the same chart, at twice
+the distance of the round before, of which those count less that differ by more than the grain, as
+its variance tells (Dammertz et al. 2010, Edge-Avoiding À-Trous Wavelet Transform; Schied et al.
+2017, Spatiotemporal Variance-Guided Filtering).
 
 A lightmap belongs to the charts of one mesh. Coarse meshes carry their light at vertices: values
 whose linear interpolation is nearest to the light at many points of the faces, in the least squares
@@ -27,158 +28,158 @@ from ptmtools.light.looks import Look
 from ptmtools.light.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
-#: Largest difference between four texels that agree.
-AGREE = 8 / 255
-#: Least share of the bilinear weight of texels of the same chart.
-_ENOUGH = 0.5
+#: Distances of the texels of each round, and by how many deviations their light differs.
+_STEPS, _APART = (1, 2, 4, 8), 3.0
+#: Weights of texels at a distance of 0, 1 and 2 steps.
+_SPLINE = np.array([3 / 8, 1 / 4, 1 / 16], np.float32)
 
 
 @dataclass(frozen=True)
-class Lightmap:
-    """A lightmap: (size, size) linear light, rows from the top, and the numbers of its texels that
-    were computed, and that are read on faces."""
+class TexelGrid:
+    """The texels of a lightmap that faces read.
 
-    value: Singles
-    computed: int
-    covered: int
-
-
-def bake(
-    look: Look,
-    corner: Floats,
-    atlas: Atlas,
-    grain: float,
-    sizes: tuple[int, ...],
-    least: float = 0.0,
-) -> list[Lightmap]:
-    """The lightmaps of (T, 3, 3) faces, whose light is ``look``.
-
-    Neighbours that differ by more than ``grain`` stay apart; ``sizes`` ascend, each twice the one
-    before; texels with less light than ``least`` take that of others nearby.
+    Attributes
+    ----------
+    corner, uv: (T, 3, 3) and (T, 3, 2) of the faces.
+    row, column, face: (n,) of each texel, rows from the top.
+    chart: (size, size) the chart of each texel, -1 if no face reads it.
+    centred: (size, size) whether a face holds the centre of a texel.
     """
-    sizes = (sizes[0] // 2, *sizes)
-    result: list[Lightmap] = []
-    below: tuple[Singles, NDArray[np.int32], Bools] | None = None
-    for size in sizes:
+
+    corner: Floats
+    uv: Floats
+    row: Ints
+    column: Ints
+    face: Ints
+    chart: NDArray[np.int32]
+    centred: Bools
+
+    @staticmethod
+    def of_atlas(corner: Floats, atlas: Atlas, size: int) -> TexelGrid:
+        """The texels of a square lightmap of ``size`` of (T, 3, 3) faces."""
         centre = cover(atlas.uv, size)
         owner = claim(atlas.uv, centre)
         chart = np.where(owner >= 0, atlas.chart[owner], -1).astype(np.int32)
-        value = np.zeros((size, size), np.float32)
-        known = np.zeros((size, size), np.bool_)
-        if below is not None:
-            value, known = _enlarge(*below, chart)
-        row, column = np.nonzero((owner >= 0) & ~known)
+        row, column = np.nonzero(owner >= 0)
         face = owner[row, column].astype(np.int64)
-        point = _positions(atlas.uv, corner, face, row, column, size)
-        turn = (column * SPREAD[0] + row * SPREAD[1]) % 1.0
-        value[row, column] = look(face, point, turn)
-        value[row, column] = smooth(value, chart, row, column, np.float32(grain))
-        below = value, chart, centre >= 0
-        if size > sizes[0]:
-            read = owner >= 0
-            light = read & (value >= least)
-            filled = fill(value, light if light.any() else read)
-            result.append(Lightmap(filled, len(row), int(read.sum())))
-    return result
+        return TexelGrid(corner, atlas.uv, row, column, face, chart, centre >= 0)
 
+    def points(self, number: Ints | slice = slice(None)) -> Floats:
+        """(n, 3) the points of faces that are nearest to the centres of texels."""
+        size, face = len(self.chart), self.face[number]
+        across, up = (self.column[number] + 0.5) / size, 1 - (self.row[number] + 0.5) / size
+        share = nearest(self.uv[face], np.stack([across, up], axis=1))
+        # Texels whose centres are on the lower edge of a wall would be in the ground.
+        share += INWARD_SHARE * (1 / 3 - share)
+        return np.asarray(np.einsum("nk,nkx->nx", share, self.corner[face]))
 
-def fill(value: Singles, known: Bools) -> Singles:
-    """The known values, and nearby ones in the other texels, by a pyramid of means."""
-    if known.all() or not known.any():
-        return np.asarray(np.where(known, value, 1), np.float32)
-    height, width = value.shape
-    # Even sides: a last row or column counts twice.
-    grown = [(0, height % 2), (0, width % 2)]
-    weight = np.pad(known, grown).astype(np.float32)
-    total_known = np.pad(np.where(known, value, 0), grown).astype(np.float32)
-    count = weight.reshape(weight.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
-    total = total_known.reshape(total_known.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
-    mean = np.divide(total, count, out=np.zeros_like(total), where=count > 0)
-    coarse = fill(mean, count > 0)
-    fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-    return np.asarray(np.where(known, value, fine), np.float32)
+    def turns(self, number: Ints | slice = slice(None)) -> Floats:
+        """(n,) turns from 0 to 1, far apart in neighbours."""
+        return (self.column[number] * SPREAD[0] + self.row[number] * SPREAD[1]) % 1.0
 
+    def smooth(self, light: Singles, variance: Singles, least: float) -> Singles:
+        """(n, k) light of the texels without its grain, whose (n,) variance is that of the mean of
+        k colours; differences of ``least`` do not count. NaN of covered texels stays."""
+        covered = np.asarray(np.isnan(light).any(axis=1))
+        chart = self.chart.copy()
+        chart[self.row[covered], self.column[covered]] = -1
+        value = np.zeros((*chart.shape, light.shape[1]), np.float32)
+        grain = np.zeros(chart.shape, np.float32)
+        value[self.row, self.column] = np.where(covered[:, None], 0, light)
+        grain[self.row, self.column] = np.where(covered, 0, variance)
+        for step in _STEPS:
+            value, grain = smooth(value, blur(grain, chart), chart, step, least, _SPLINE)
+        return np.where(covered[:, None], np.nan, value[self.row, self.column])
 
-def _positions(
-    uv: Floats, corner: Floats, face: Ints, row: Ints, column: Ints, size: int
-) -> Floats:
-    """(n, 3) the points of faces that are nearest to the centres of texels."""
-    at = np.stack([(column + 0.5) / size, 1 - (row + 0.5) / size], axis=1)
-    share = nearest(uv[face], at)
-    # Texels whose centres are on the lower edge of a wall would be in the ground.
-    share += INWARD_SHARE * (1 / 3 - share)
-    return np.asarray(np.einsum("nk,nkx->nx", share, corner[face]))
-
-
-def _enlarge(
-    value: Singles, chart: NDArray[np.int32], centred: Bools, larger: NDArray[np.int32]
-) -> tuple[Singles, Bools]:
-    """A lightmap of twice the size by bilinear filtering, and the texels in which it is valid:
-    enough of the four texels belong to the chart of the one between them, these agree, and a face
-    holds the centre of one of them."""
-    place = (np.arange(len(larger)) + 0.5) / 2 - 0.5
-    first = np.clip(np.floor(place).astype(np.int64), 0, len(value) - 2)
-    second = np.clip(place - first, 0, 1).astype(np.float32)
-    return interpolate(value, chart, centred, larger, first, np.stack([1 - second, second]))
+    def fill(self, light: Singles) -> Singles:
+        """(size, size, k) the lightmap of (n, k) light, of which covered texels have NaN."""
+        sound = ~np.asarray(np.isnan(light).any(axis=1))
+        if not sound.any():
+            sound, light = np.ones(len(light), np.bool_), np.nan_to_num(light)
+        value = np.zeros((*self.chart.shape, light.shape[1]), np.float32)
+        known = np.zeros(self.chart.shape, np.bool_)
+        value[self.row[sound], self.column[sound]] = light[sound]
+        known[self.row[sound], self.column[sound]] = True
+        return fill(value, known)
 
 
 @kernel
-def interpolate(
-    value: Singles,
-    chart: NDArray[np.int32],
-    centred: Bools,
-    larger: NDArray[np.int32],
-    first: Ints,
-    share: Singles,
-) -> tuple[Singles, Bools]:
-    """See `_enlarge`; ``first``: (size,) the first of the two rows or columns for each of the
-    larger lightmap, ``share``: (2, size) the shares of both."""
-    size = len(larger)
-    mean, believed = np.zeros((size, size), np.float32), np.zeros((size, size), np.bool_)
-    for row in range(size):
-        for column in range(size):
-            own_chart, known = larger[row, column], False
-            weight, total = np.float32(0), np.float32(0)
-            smallest, largest = np.float32(np.inf), np.float32(-np.inf)
-            for i in range(2):
-                for j in range(2):
-                    r, c = first[row] + i, first[column] + j
-                    if chart[r, c] != own_chart:
-                        continue
-                    part = share[i, row] * share[j, column]
-                    weight += part
-                    total += part * value[r, c]
-                    smallest, largest = min(smallest, value[r, c]), max(largest, value[r, c])
-                    known |= centred[r, c]
-            if weight > 0:
-                mean[row, column] = total / weight
-            agree = largest - smallest <= np.float32(AGREE)
-            believed[row, column] = own_chart >= 0 and weight >= _ENOUGH and known and agree
-    return mean, believed
+def blur(variance: NDArray[np.float32], chart: NDArray[np.int32]) -> NDArray[np.float32]:
+    """(h, w) the mean of the variances of each texel and of the eight around it in its chart."""
+    height, width = variance.shape
+    result = np.zeros_like(variance)
+    for row in range(height):
+        for column in range(width):
+            total, count = 0.0, 0
+            for r in range(max(row - 1, 0), min(row + 2, height)):
+                for c in range(max(column - 1, 0), min(column + 2, width)):
+                    if chart[r, c] == chart[row, column]:
+                        total += variance[r, c]
+                        count += 1
+            result[row, column] = total / count
+    return result
 
 
 @kernel
 def smooth(
-    value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints, grain: np.float32
-) -> Singles:
-    """(n,) the binomial mean of some texels and of those neighbours on the same chart that differ
-    from them by no more than ``grain``."""
-    height, width = value.shape
-    result = np.empty(len(row), np.float32)
-    for n in range(len(row)):
-        centre, centre_chart = value[row[n], column[n]], chart[row[n], column[n]]
-        weight, total = np.float32(0), np.float32(0)
-        for i in range(-1, 2):
-            for j in range(-1, 2):
-                r, c = row[n] + i, column[n] + j
-                if not (0 <= r < height and 0 <= c < width) or chart[r, c] != centre_chart:
-                    continue
-                if abs(value[r, c] - centre) <= grain:
-                    share = np.float32((2 - abs(i)) * (2 - abs(j)) / 16)
+    value: NDArray[np.float32],
+    variance: NDArray[np.float32],
+    chart: NDArray[np.int32],
+    step: int,
+    least: float,
+    spline: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """One round: (h, w, k) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
+    and `_SPLINE`."""
+    height, width, channels = value.shape
+    result, rest = np.zeros_like(value), np.zeros_like(variance)
+    for row in range(height):
+        for column in range(width):
+            if chart[row, column] < 0:
+                continue
+            own = 0.0
+            for k in range(channels):
+                own += value[row, column, k] / channels
+            apart = _APART * np.sqrt(variance[row, column]) + least
+            weight, total = 0.0, 0.0
+            for i in range(-2, 3):
+                for j in range(-2, 3):
+                    r, c = row + step * i, column + step * j
+                    if not (0 <= r < height and 0 <= c < width):
+                        continue
+                    if chart[r, c] != chart[row, column]:
+                        continue
+                    other = 0.0
+                    for k in range(channels):
+                        other += value[r, c, k] / channels
+                    share = spline[abs(i)] * spline[abs(j)] * np.exp(-abs(own - other) / apart)
                     weight += share
-                    total += share * value[r, c]
-        result[n] = total / weight
-    return result
+                    total += share * share * variance[r, c]
+                    for k in range(channels):
+                        result[row, column, k] += share * value[r, c, k]
+            for k in range(channels):
+                result[row, column, k] /= weight
+            rest[row, column] = total / (weight * weight)
+    return result, rest
+
+
+def fill(value: Singles, known: Bools) -> Singles:
+    """(h, w, k) the known values, and nearby ones in the other texels, by a pyramid of means; 1 if
+    none is known."""
+    if known.all() or not known.any():
+        return np.asarray(np.where(known[..., None], value, 1), np.float32)
+    height, width, channels = value.shape
+    # Even sides: a last row or column counts twice.
+    grown = [(0, height % 2), (0, width % 2)]
+    weight = np.pad(known, grown).astype(np.float32)
+    total = np.pad(np.where(known[..., None], value, 0), [*grown, (0, 0)]).astype(np.float32)
+    count = weight.reshape(weight.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
+    total = total.reshape(len(total) // 2, 2, -1, 2, channels).sum(axis=(1, 3))
+    some = count[..., None]
+    mean = np.divide(total, some, out=np.zeros_like(total), where=some > 0)
+    coarse = fill(mean, count > 0)
+    fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+    return np.asarray(np.where(known[..., None], value, fine), np.float32)
 
 
 #: Number of points of a face at which its light is computed.
@@ -191,16 +192,23 @@ _ROUNDS = 24
 
 
 def vertex_light(look: Look, corner: Floats, normal: Floats) -> Floats:
-    """(T, 3) light from 0 to 1 at the corners of (T, 3, 3) faces with (T, 3) normals; ``look`` is
-    their light."""
+    """(T, 3, k) light of at least 0 at the corners of (T, 3, 3) faces with (T, 3) normals; ``look``
+    is their light. Covered points do not count."""
     count = len(corner)
     share = _triangle_points()
     point = np.einsum("pk,tkx->tpx", share, corner).reshape(-1, 3)
     face = np.repeat(np.arange(count), POINTS)
-    seen = look(face, point, turns(len(point))).reshape(count, POINTS)
-    vertex = _vertex_numbers(corner, normal)
-    fitted = _fit(vertex, share, seen, areas(corner))
-    return np.clip(fitted[vertex], 0.0, 1.0)
+    seen = look(face, point, turns(len(point))).astype(np.float64)
+    sound = np.asarray(~np.isnan(seen).any(axis=1))
+    mean = seen[sound].mean(axis=0) if sound.any() else np.zeros(seen.shape[1])
+    seen = np.where(sound[:, None], seen, 0).reshape(count, POINTS, -1)
+    number = sound.reshape(count, POINTS).sum(axis=1)
+    usual = seen.sum(axis=1) / np.maximum(number, 1)[:, None]
+    usual[number == 0] = mean
+    seen = np.where(sound.reshape(count, POINTS, 1), seen, usual[:, None])
+    vertex, area = _vertex_numbers(corner, normal), areas(corner) * (number > 0)
+    fitted = np.stack([_fit(vertex, share, part, area) for part in np.moveaxis(seen, 2, 0)], axis=1)
+    return np.maximum(fitted[vertex], 0.0)
 
 
 def _triangle_points() -> Floats:
@@ -229,7 +237,7 @@ def _vertex_numbers(corner: Floats, normal: Floats) -> Ints:
     return number.reshape(-1, 3)
 
 
-def _fit(vertex: Ints, share: Floats, seen: Singles, area: Floats) -> Floats:
+def _fit(vertex: Ints, share: Floats, seen: Floats, area: Floats) -> Floats:
     """(V,) values at vertices whose interpolation is nearest to the light ``seen`` at the points of
     each face, by conjugate gradients on the normal equations."""
     count, weight = (

@@ -1,19 +1,10 @@
-"""The light of a surface: by rays, or from the lightmap of the model; and the lit side of a face.
-
-Of a face with two sides, that side counts on which viewers can be. Walks by random rays begin on
-both sides and turn at surfaces; the side from which more of them reach the sky counts, or the
-lighter one if they are alike, as of a fence or within a building. Faces of one plane that share an
-edge are decided together, by points spread over all of them, and more points where the two sides
-are close. (The lighter side of each face by itself, by 16 rays from its middle, takes a hall of
-20 m for lighter than a court of 3 m.)
-"""
+"""The light of a surface, from the lightmaps of the model; the planes that faces are parts of."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,59 +13,14 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.cells.search import connect
 from ptmtools.errors import naming
-from ptmtools.light.occlusion import (
-    Occluders,
-    count_escapes,
-    light,
-    move_outwards,
-    normals,
-    points_on,
-    spread_over,
-    turns,
-)
 from ptmtools.scene.source import SourceWrap
 from ptmtools.tolerance import PARALLEL_COSINE
 
-#: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
-#: light from 0 to 1.
+#: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n, 3) linear
+#: light in colours, or (n, 1); NaN of points that something covers.
 Look = Callable[[Ints, Floats, Floats], Singles]
 #: Areas, m², and densities below this count as this.
 SMALLEST = 1e-9
-#: The grain of n rays is within this, divided by the root of n.
-_GRAIN = 0.8
-
-
-@dataclass(frozen=True)
-class RayLight:
-    """The light by rays of (T, 3, 3) faces, on their (T,) sides: 1 for the front, -1 for the back;
-    see `light`.
-
-    Faces up to ``error`` metres off the model's surface have its light; ``above``: see `light`.
-    """
-
-    around: Occluders
-    corner: Floats
-    samples: int
-    reach: float
-    error: float = 0.0
-    side: Floats | float = 1.0
-    above: float = 0.0
-
-    @cached_property
-    def normal(self) -> Floats:
-        """(T, 3) of the lit sides."""
-        side = np.broadcast_to(self.side, len(self.corner))
-        return np.asarray(normals(self.corner) * side[:, None])
-
-    @property
-    def grain(self) -> float:
-        """Largest difference between samples of the same light."""
-        return _GRAIN / math.sqrt(self.samples)
-
-    def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        normal = self.normal[face]
-        place = move_outwards(self.around, point, normal, self.error)
-        return light(self.around, place, normal, turn, self.samples, self.reach, self.above)
 
 
 @dataclass(frozen=True)
@@ -157,7 +103,7 @@ class PaintedLight:
         for number in np.unique(index[index >= 0]).tolist():
             image, these = self.images[number], index == number
             result[these] = 1 - image.strength * (1 - lookup(image, at[these]))
-        return result
+        return result[:, None]
 
 
 def lookup(image: LightImage, at: Floats) -> Singles:
@@ -182,54 +128,8 @@ def _texel_pairs(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, 
     return np.maximum(first, 0), np.minimum(first + 1, count - 1), place - first
 
 
-#: Points of a plane from which walks begin on either side, at first and if the sides are close;
-#: walks from each, and most turns of one: from the underside of a sill to the ground, to a wall, to
-#: the sky.
-_POINTS, _MORE, _WALKS, _BOUNCES = 8, 32, 16, 3
-#: Two sides differ if their counts of rays do by more standard deviations.
-_SURE = 3.0
 #: Planes are followed through edges of at most this many faces.
 _AT_AN_EDGE = 4
-
-
-def open_sides(
-    around: Occluders, corner: Floats, both: Bools, reach: float, *, indoors: bool = False
-) -> Floats:
-    """(T,) -1 for faces of which the back counts, and 1 for all others.
-
-    ``corner``: (T, 3, 3); ``both``: (T,) which have two sides; ``reach``: as of `light`.
-    ``indoors``: the sky does not count, the lighter side is the one.
-    """
-    normal = normals(corner)
-    area = areas(corner)
-    wanted = both & (area > 0)
-    if not wanted.any():
-        return np.ones(len(corner))
-    plane = planes(corner, normal, wanted)
-    # Relative to the first face of the plane.
-    sign = np.where(np.einsum("tx,tx->t", normal, normal[plane]) < 0, -1.0, 1.0)
-    front, back = np.zeros(len(corner)), np.zeros(len(corner))
-
-    def look(chosen: Ints, points: int, *, sky: bool) -> None:
-        """Set `front` and `back` of planes, by the numbers of their first faces."""
-        face = spread_over(area, np.where(wanted, plane, -1), chosen, points).ravel()
-        point, turn = (
-            points_on(corner[face], np.tile(np.arange(points), len(chosen))),
-            turns(len(face)),
-        )
-        for counts, side in ((front, 1.0), (back, -1.0)):
-            way = side * sign[face, None] * normal[face]
-            rays = around, point, way, turn, _WALKS
-            seen = count_escapes(*rays, _BOUNCES) if sky else light(*rays, reach)
-            counts[chosen] = seen.reshape(len(chosen), points).sum(axis=1)
-
-    chosen = np.unique(plane[wanted])
-    rounds = ((_POINTS, True), (_MORE, True), (_MORE, False))
-    for points, sky in ((_POINTS, False),) if indoors else rounds:
-        look(chosen, points, sky=sky)
-        close = np.abs(front - back) <= _SURE * np.sqrt(front + back)
-        chosen = chosen[close[chosen]]
-    return np.where(wanted, np.where((back > front)[plane], -sign, sign), 1.0)
 
 
 def planes(

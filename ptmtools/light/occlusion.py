@@ -14,7 +14,6 @@ above a surface as the scene's tolerance for planes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -30,7 +29,7 @@ from ptmtools.tolerance import DEPTH_SHARE
 
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**17
-_GOLDEN = 0.6180339887498949
+GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True)
@@ -102,131 +101,6 @@ class Occluders:
         return result
 
 
-def move_outwards(around: Occluders, point: Floats, normal: Floats, within: float) -> Floats:
-    """(n, 3) points moved to the outermost surface within ``within`` metres along their normals,
-    before or behind them; unchanged without one.
-
-    The model's own faces would shade those of a coarse mesh beneath them.
-    """
-    if around.tree is None or within <= around.lift:
-        return point
-    start = (point + within * normal - around.middle).astype(np.float32)
-    limit = np.full(len(point), 2 * within, np.float32)
-    back = (-normal).astype(np.float32)
-    distance = around.tree.run(start, back, dists=limit.copy(), query="DISTANCE")
-    moved = np.where(distance < limit, within - distance.astype(np.float64), 0.0)
-    return np.asarray(point + moved[:, None] * normal)
-
-
-def light(
-    around: Occluders,
-    point: Floats,
-    normal: Floats,
-    turn: Floats,
-    samples: int,
-    reach: float,
-    above: float = 0.0,
-) -> Singles:
-    """(n,) light from 0 to 1 at (n, 3) points with (n, 3) unit normals.
-
-    Parameters
-    ----------
-    turn: (n,) rotation of the directions about the normals, in turns from 0 to 1.
-    samples, reach: number of rays for each point; metres, beyond which surfaces do not occlude.
-    above: by how much less light comes from straight below than from straight above, in [0, 1]. Of
-        a level surface in the open, the light stays 1.
-    """
-    return light_and_sky(around, point, normal, turn, samples, reach, above, sky=False)[0]
-
-
-def light_and_sky(
-    around: Occluders,
-    point: Floats,
-    normal: Floats,
-    turn: Floats,
-    samples: int,
-    reach: float,
-    above: float = 0.0,
-    *,
-    sky: bool = True,
-) -> tuple[Singles, Singles]:
-    """(n,) light as of `light`, and (n,) the share of the same rays that reach the sky: they meet
-    nothing opaque at any distance, nor the ground. Without ``sky``, 0: rays end at ``reach``."""
-    result, open_share = np.empty(len(point), np.float32), np.zeros(len(point), np.float32)
-    for part, origin, along in _fans(around, point, normal, turn, samples):
-        start = origin.astype(np.float32)
-        share, unmet = _ray_light(around, start, along, reach, math.inf if sky else reach)
-        if above:
-            share *= (1 - above * (1 - along[:, 1]) / 2) / (1 - above / 6)
-        result[part] = share.reshape(-1, samples).mean(axis=1)
-        if sky:
-            open_share[part] = unmet.reshape(-1, samples).mean(axis=1)
-    return result, open_share
-
-
-def _fans(
-    around: Occluders, point: Floats, normal: Floats, turn: Floats, samples: int
-) -> Iterator[tuple[slice, Floats, Singles]]:
-    """Runs of points, with the (k, 3) origins of the rays from these, relative to the middle of the
-    scene, and their (k, 3) directions; see `light`."""
-    fan, step = hemisphere(samples), max(1, RAYS // samples)
-    for at in range(0, len(point), step):
-        part = slice(at, at + step)
-        along = (fan @ tangent_frames(normal[part], turn[part])).reshape(-1, 3)
-        lifted = point[part] + around.lift * normal[part] - around.middle
-        yield part, np.repeat(lifted, samples, axis=0), along
-
-
-def count_escapes(
-    around: Occluders,
-    point: Floats,
-    normal: Floats,
-    turn: Floats,
-    samples: int,
-    bounces: int,
-) -> Ints:
-    """(n,) the number of ``samples`` walks from (n, 3) points into the hemispheres over (n, 3)
-    normals that reach the sky, each reflected by surfaces at most ``bounces`` times. ``turn`` as of
-    `light`."""
-    fan = hemisphere(samples)
-    count = np.zeros(len(point), np.int64)
-    for part, origin, along in _fans(around, point, normal, turn, samples):
-        walk = np.arange(len(origin))
-        for bounce in range(bounces + 1):
-            length, against = _first_hits(around, origin, along)
-            out = np.isinf(length)
-            count[part] += np.bincount(walk[out] // samples, minlength=len(count[part]))
-            if bounce == bounces or out.all():
-                break
-            kept = ~out
-            origin, walk, back = origin[kept], walk[kept], against[kept]
-            origin = origin + length[kept, None] * along[kept] + around.lift * back
-            ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
-            turned = np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64)
-            frames = tangent_frames(back, turned)
-            along = np.einsum("nk,nkx->nx", ways, frames)
-    return count
-
-
-def _first_hits(around: Occluders, origin: Floats, along: Singles) -> tuple[Floats, Floats]:
-    """(n,) lengths of rays whose origins are relative to the middle of the scene, inf to the sky;
-    (n, 3) the normals of the surfaces that they meet, against them."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        down = (around.ground - around.middle[1] - origin[:, 1]) / along[:, 1]
-    length = np.where(along[:, 1] < 0, np.maximum(down, 0), np.inf)
-    against = np.zeros((len(length), 3))
-    against[:, 1] = 1.0
-    if around.tree is not None:
-        hit = around.tree.run(origin.astype(np.float32), along.astype(np.float32), output=True)
-        nearer = (hit["primID"] >= 0) & (hit["tfar"] < length)
-        length[nearer] = hit["tfar"][nearer]
-        face = around.points[around.triangles[hit["primID"][nearer]]]
-        way = normals(face)
-        facing = np.einsum("nx,nx->n", way, along[nearer]) < 0
-        against[nearer] = np.where(facing[:, None], way, -way)
-    return length, against
-
-
 def hemisphere(samples: int) -> Singles:
     """(samples, 3) directions over z, with a density in proportion to the cosine."""
     number = np.arange(samples)
@@ -249,7 +123,7 @@ def normals(corner: Floats) -> Floats:
 
 def turns(count: int) -> Floats:
     """(count,) turns from 0 to 1, far apart in sequence."""
-    return np.asarray(np.arange(count) * _GOLDEN % 1.0)
+    return np.asarray(np.arange(count) * GOLDEN % 1.0)
 
 
 def tangent_frames(normal: Floats, turn: Floats) -> Singles:
@@ -266,24 +140,6 @@ def tangent_frames(normal: Floats, turn: Floats) -> Singles:
     return np.stack([c * first + s * second, c * second - s * first, normal], axis=1).astype(
         np.float32
     )
-
-
-def _ray_light(
-    around: Occluders, origin: Singles, along: Singles, reach: float, longest: float
-) -> tuple[Singles, Bools]:
-    """(n,) the light of each ray, and (n,) whether it meets nothing within ``longest``, which is
-    ``reach`` at least."""
-    limit = np.full(len(origin), min(longest, np.finfo(np.float32).max), np.float32)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        down = (np.float32(around.ground - around.middle[1]) - origin[:, 1]) / along[:, 1]
-    stop = np.where((along[:, 1] < 0) & (down < limit), np.maximum(down, 0), limit)
-    if around.tree is not None:
-        # A copy: Embree writes into its arguments.
-        stop = around.tree.run(origin, along, dists=stop.astype(np.float32), query="DISTANCE")
-    unmet = stop >= limit
-    if math.isinf(reach):
-        return unmet.astype(np.float32), unmet
-    return np.minimum(stop / np.float32(reach), np.float32(1)), unmet
 
 
 #: Multiples of these modulo 1 are far apart in both directions (Roberts' R2 sequence).

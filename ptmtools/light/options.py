@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from ptmtools.options import option, require, require_ranges
 
 #: Field → (least, most).
-RANGES = {"light_density": (0.1, 1000.0), "light_samples": (1, 4096), "light_reach": (1e-3, 1e6)}
+RANGES = {"light_density": (0.1, 1000.0), "light_samples": (1, 4096)}
 
 
 @dataclass(frozen=True)
@@ -19,19 +19,16 @@ class LightOptions:
 
     light: Literal["auto", "bake", "model", "none"] = option(
         "auto",
-        "Light of the surfaces, in one lightmap for each cell: bake (ambient light, darker in "
-        "corners and below things, with that of lamps and of the sky through windows), model (the "
-        "lightmaps of a glTF, its occlusion textures) or none (colours as in the model). auto: "
-        "model if there are any, else bake, within a tenth of the bytes of the images, else none.",
+        "Light of the surfaces, in one lightmap for each cell: bake (lamps, the sun and the sky, "
+        "and what surfaces reflect; of ceilings where there is none), model (the lightmaps of a "
+        "glTF, its occlusion textures) or none (colours as in the model). auto: model if there are "
+        "any, else bake, within 400 kB or a tenth of the bytes of the images.",
         basic=True,
     )
     light_density: float = option(
         10.0, "Texels of a lightmap for each metre of surface.", metavar="TEXELS"
     )
-    light_samples: int = option(64, "Number of rays for each texel of a lightmap.")
-    light_reach: float = option(
-        3.0, "Distance beyond which surfaces cast no shadow.", metavar="METRES"
-    )
+    light_samples: int = option(32, "Number of rays for each texel of a lightmap.")
 
     def __post_init__(self) -> None:
         require_ranges(

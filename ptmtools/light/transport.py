@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,22 @@ class Daylight:
     ground: Floats
 
 
+class Arrived(NamedTuple):
+    """What reaches n points by rays.
+
+    Attributes
+    ----------
+    light: (n, 3).
+    blocked: (n,) the share of rays that meet something nearer than a distance, or the unlit side of
+        a face: of a point that is covered, or within a wall.
+    variance: (n,) of the mean of the colours, as if the rays were independent.
+    """
+
+    light: Singles
+    blocked: Singles
+    variance: Singles
+
+
 @dataclass(frozen=True)
 class LightField:
     """What the surfaces of a building send out.
@@ -64,31 +81,35 @@ class LightField:
     daylight: Daylight
 
     def gather(
-        self, point: Floats, normal: Floats, turn: Floats, samples: int, near: float
-    ) -> tuple[Singles, Singles]:
-        """(n, 3) light at (n, 3) points with (n, 3) unit normals, and (n,) the share of rays that
-        meet something nearer than ``near`` metres or the unlit side of a face: of a point that is
-        covered, or within a wall.
+        self, point: Floats, normal: Floats, turn: Floats, samples: int, near: float = 0.0
+    ) -> Arrived:
+        """What reaches (n, 3) points with (n, 3) unit normals by a number of rays each.
 
         turn: (n,) rotation of the directions about the normals, in turns from 0 to 1.
+        near: see `Arrived`, metres.
         """
-        light, blocked = np.empty((len(point), 3), np.float32), np.empty(len(point), np.float32)
+        count = len(point)
+        arrived = Arrived(*(np.empty((count, k), np.float32) for k in (3, 1, 1)))
         fan, step = hemisphere(samples), max(1, RAYS // samples)
         for at in range(0, len(point), step):
             part = slice(at, at + step)
             along = (fan @ tangent_frames(normal[part], turn[part])).reshape(-1, 3)
             start = point[part] + self.around.lift * normal[part] - self.around.middle
             origin = np.repeat(start, samples, axis=0)
-            light[part], blocked[part] = self._receive(origin, along, samples, near)
-        return light, blocked
+            for whole, some in zip(
+                arrived, self._receive(origin, along, samples, near), strict=True
+            ):
+                whole[part] = some
+        return Arrived(arrived.light, arrived.blocked[:, 0], arrived.variance[:, 0])
 
     def _receive(
         self, origin: Floats, along: Singles, samples: int, near: float
-    ) -> tuple[Singles, Singles]:
+    ) -> tuple[Singles, Singles, Singles]:
         if self.around.tree is None:
             sky = np.where(along[:, 1:2] >= 0, self.daylight.sky, self.daylight.ground)
             mean = sky.reshape(-1, samples, 3).mean(axis=1)
-            return mean.astype(np.float32), np.zeros(len(mean), np.float32)
+            nothing = np.zeros((len(mean), 1), np.float32)
+            return mean.astype(np.float32), nothing, nothing
         hit = self.around.tree.run(
             origin.astype(np.float32), np.ascontiguousarray(along, np.float32), output=True
         )
@@ -106,14 +127,17 @@ def transport(
     albedo: Floats,
     direct: Floats,
     daylight: Daylight,
+    emission: Floats | float = 0.0,
     passes: int = PASSES,
 ) -> LightField:
     """The light of a building in balance. ``albedo``: (F, 3) of the faces of the patches;
-    ``direct``: (patches, 3) the light of lamps; ``passes``: at least 1."""
+    ``direct``: (patches, 3) the light of lamps; ``emission``: (patches, 3) what
+    patches send that are no lamps; ``passes``: at least 1."""
     face, side, number = patches.faces()
     normal = normals(patches.corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
     reflected = np.minimum(albedo, MOST_REFLECTED)[face]
-    radiance = (reflected * direct).astype(np.float32)
+    radiance = (reflected * direct + emission).astype(np.float32)
+    emitted = np.broadcast_to(emission, radiance.shape)
     field = LightField(around, patches, radiance, daylight)
     step, counted = max(1, RAYS // PASS_RAYS), min(COUNTED, passes)
     spread, area = turns(patches.count), patches.areas()[face]
@@ -125,14 +149,14 @@ def transport(
             shift = spread[part] + turn * SPREAD[1]
             across, along = (shift * 7 + SPREAD[0] * turn) % 1.0, (shift * 3) % 1.0
             point = patches.points(face[part], number[part], across, along)
-            light[part], _ = field.gather(point, normal[part], shift % 1.0, PASS_RAYS, 0.0)
-            radiance[part] = reflected[part] * (direct[part] + light[part])
+            light[part] = field.gather(point, normal[part], shift % 1.0, PASS_RAYS).light
+            radiance[part] = reflected[part] * (direct[part] + light[part]) + emitted[part]
         if turn >= passes - counted:
             total += light
         sums.append(float(area @ light.mean(axis=1)))
         if turn == passes - counted - 1:
-            radiance[:] = reflected * (direct + extrapolation(sums) * light)
-    radiance[:] = reflected * (direct + total / counted)
+            radiance[:] = reflected * (direct + extrapolation(sums) * light) + emitted
+    radiance[:] = reflected * (direct + total / counted) + emitted
     return field
 
 
@@ -163,28 +187,34 @@ def receive(
     ground: NDArray[np.float64],
     samples: int,
     near: float,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The mean of what ``samples`` rays of each point bring: see `LightField.gather`."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """The fields of `Arrived`, the last two (n, 1), for ``samples`` rays of each point."""
     count = len(face) // samples
-    light, blocked = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+    light, blocked = np.zeros((count, 3), np.float32), np.zeros((count, 1), np.float32)
+    variance = np.zeros((count, 1), np.float32)
     for p in range(count):
         red, green, blue, stopped = 0.0, 0.0, 0.0, 0
+        total, squares = 0.0, 0.0
         for ray in range(p * samples, (p + 1) * samples):
             f = face[ray]
+            r, g, b = 0.0, 0.0, 0.0
             if f < 0:
                 if upwards[ray] >= 0:
-                    red, green, blue = red + sky[0], green + sky[1], blue + sky[2]
+                    r, g, b = sky[0], sky[1], sky[2]
                 else:
-                    red, green, blue = red + ground[0], green + ground[1], blue + ground[2]
-                continue
-            start = first[f, 0 if facing[ray] else 1]
-            if start < 0 or length[ray] < near:
-                stopped += 1
-            if start >= 0:
-                k = start + patch_number(split[f], u[ray], v[ray])
-                red += radiance[k, 0]
-                green += radiance[k, 1]
-                blue += radiance[k, 2]
+                    r, g, b = ground[0], ground[1], ground[2]
+            else:
+                start = first[f, 0 if facing[ray] else 1]
+                if start < 0 or length[ray] < near:
+                    stopped += 1
+                if start >= 0:
+                    k = start + patch_number(split[f], u[ray], v[ray])
+                    r, g, b = radiance[k, 0], radiance[k, 1], radiance[k, 2]
+            red, green, blue = red + r, green + g, blue + b
+            mean = (r + g + b) / 3
+            total += mean
+            squares += mean * mean
         light[p, 0], light[p, 1], light[p, 2] = red / samples, green / samples, blue / samples
-        blocked[p] = stopped / samples
-    return light, blocked
+        blocked[p, 0] = stopped / samples
+        variance[p, 0] = max(squares / samples - (total / samples) ** 2, 0.0) / samples
+    return light, blocked, variance

@@ -154,7 +154,7 @@ class Baking:
         inside[:, 2] = np.maximum(inside[:, 2], _LEAST_ALONG)
         value = np.zeros((side, side, 3), np.float32)
         value[row, column] = _units(inside, 2)
-        full = np.stack([fill(value[..., k], owner >= 0) for k in range(3)], axis=2)
+        full = fill(value, owner >= 0)
         return _encode(_units(full, 2)), 1 - float(met.mean())
 
     def comparison(self, count: float) -> Compared:

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.light.atlas import unwrap
-from ptmtools.light.lightmap import bake, vertex_light
-from ptmtools.light.looks import PaintedLight, RayLight, open_sides
+from ptmtools.light.lightmap import vertex_light
+from ptmtools.light.looks import PaintedLight
 from ptmtools.light.occlusion import Occluders, normals
 from ptmtools.scene.colors import encode_srgb, to_linear
 from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
+from ptmtools_systems.campus.lightmaps import bake
 from ptmtools_systems.campus.meshes import Corners, mesh_bytes
 from ptmtools_systems.campus.model import (
     LIGHT_SIZES,
@@ -33,6 +34,7 @@ from ptmtools_systems.campus.model import (
     mesh_file,
 )
 from ptmtools_systems.campus.objects import ObjectPart
+from ptmtools_systems.campus.obscurance import RayLight, open_sides
 from ptmtools_systems.campus.options import CampusOptions
 from ptmtools_systems.campus.second_set import ModelLight
 from ptmtools_systems.campus.textures import Written, light_files
@@ -196,7 +198,7 @@ def _mesh_files(
         color = None if colors is None else to_linear(colors / 255)
         if light and not fine:
             look = _look(work, faces, finest, level, light.side)
-            brightness = vertex_light(look, points, normals(points))[..., None]
+            brightness = np.minimum(vertex_light(look, points, normals(points)), 1)
             color = brightness * (np.ones(3) if color is None else color)
         corners = Corners(points, material, uv, light.uv if light and fine else None, color)
         data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)

@@ -7,7 +7,8 @@ like textures.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,14 @@ from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import TextureOptions, bake_textures, encode_image, ptm_file
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.scene import SCENE, image_bytes, lights_of, scene_origin
-from ptmtools.pipeline.stages.textures import TEXTURES
+from ptmtools.pipeline.stages.scene import (
+    SCENE,
+    image_bytes,
+    image_digests,
+    lights_of,
+    scene_origin,
+)
+from ptmtools.pipeline.stages.textures import TEXTURES, stored_texture, texture_files
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import LIGHTS, arrays_of, sha256
 
@@ -29,6 +36,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ptmtools.cells.model import Cells
     from ptmtools.light.cells import CellLight, LightBaking
     from ptmtools.light.looks import PaintedLight
     from ptmtools.light.model import CellSurfaces, Light
@@ -36,7 +44,11 @@ if TYPE_CHECKING:
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
     from ptmtools.store.transaction import Transaction
+    from ptmtools.texture.sources import PtmSource
 
+#: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
+#: cells differ from the building by at most two stops.
+_KEY, _MOST_STOPS = 0.3, math.log(4)
 #: Lightmaps with less than this share of the texels to the metre that were asked for are reported.
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
@@ -99,18 +111,51 @@ def _baking(
     lights: Lights | None,
     pieces: list[CellSurfaces],
 ) -> LightBaking:
-    """What the tasks share: the light of the model, or lamps and the sky."""
-    from ptmtools.light.cells import ABOVE, WHITE, LightBaking
-    from ptmtools.light.lamps import lamps_of
-    from ptmtools.light.mixing import light_mix
-    from ptmtools.light.occlusion import Occluders
+    """What the tasks share: the light of the model, or that of the building."""
+    import numpy as np
+
+    from ptmtools.light.building import BuildingBaking
+    from ptmtools.light.cells import LightBaking
+    from ptmtools.scene.colors import luminance
+
+    albedo = _reflectance(run)
+    grey = luminance(albedo).astype(np.float32)
+    if model_light:
+        return LightBaking(options, None, _paint(run, model_light), grey)
+    building = BuildingBaking(run[SCENE], pieces, lights, albedo).light()
+    return LightBaking(options, building, None, grey)
+
+
+def _reflectance(run: Run) -> NDArray[np.float64]:
+    """(T, 3) the mean colour of each face of the scene, linear light."""
+    import numpy as np
+
+    from ptmtools.scene.colors import to_linear
+
+    def read(name: str) -> bytes:
+        return run.db.read_output(TEXTURES.name, name)
+
+    def source(name: str) -> PtmSource:
+        return run.db.source(name, run.db.output(TEXTURES.name, name))
 
     scene = run[SCENE]
-    around = Occluders.from_scene(scene)
-    if model_light:
-        return LightBaking(around, options, painted=_paint(run, model_light))
-    lamps = lamps_of(scene, lights)
-    return LightBaking(around, options, light_mix(around, pieces, lamps, options, ABOVE, WHITE))
+    means = []
+    for name in texture_files(image_digests(run)):
+        steps = stored_texture(run, name, source, read).steps
+        mean = np.array(steps.detail.color) / 255
+        # The mean of light is more than the light of the mean, by the second derivative.
+        spread = (steps.errors[0] / 255) ** 2
+        curve = 2.4 * 1.4 / 1.055**2 * ((mean + 0.055) / 1.055) ** 0.4
+        means.append(np.clip(to_linear(mean) + curve * spread / 2, 0, 1))
+    white = np.ones(3)
+    colors = np.array(
+        [to_linear(np.array(m.color)) * (means[m.image] if m.image >= 0 else white)
+         for m in scene.materials]
+    ).reshape(-1, 3)  # fmt: skip
+    result = colors[scene.triangle_material]
+    if scene.colors is not None:
+        result = result * to_linear(scene.colors / 255).mean(axis=1)
+    return result
 
 
 def _absence() -> MissingComponentError | None:
@@ -127,13 +172,13 @@ def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> ND
     those without a lightmap of the model, or that glow."""
     import numpy as np
 
-    from ptmtools.light.lamps import lamp_luminance
+    from ptmtools.light.lamps import lamp_radiance
 
     glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
     if lights is None:
         return glass
     dark = glass | lights.unlit
-    return dark | (lights.map < 0 if painted else lamp_luminance(scene, lights) > 0)
+    return dark | (lights.map < 0 if painted else lamp_radiance(scene, lights).any(axis=1))
 
 
 def _paint(run: Run, lights: Lights) -> PaintedLight:
@@ -153,10 +198,30 @@ def _paint(run: Run, lights: Lights) -> PaintedLight:
 
 def _kind_of_light(baking: LightBaking) -> Mapping[str, Any]:
     """What the light consists of."""
-    if baking.painted is not None:
+    building = baking.building
+    if building is None:
         return {"light": "model"}
-    lamps = baking.mix.lamps
-    return {"light": "bake", "lamps": 0 if lamps is None else len(lamps), "sky": baking.mix.sky}
+    lamps = len(building.lamps)
+    return {"light": "bake", "lamps": lamps, "sky": building.sky, "ceilings": building.ceilings}
+
+
+def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, NDArray[np.float64]]:
+    """The factor of all light with which the building has the usual exposure, and (C,) the factors
+    of cells: of what is seen from a cell, half is in its neighbours."""
+    import numpy as np
+
+    mean, area = np.array([light.radiance for light in cell_lights]).reshape(-1, 2).T
+    standing = area * (cells.standing if (area * cells.standing).any() else 1)
+    if not standing.any():
+        return 1.0, np.ones(len(area))
+    usual = float(standing @ mean / standing.sum())
+    total, weight = mean * area, area.copy()
+    for cell, near in enumerate(cells.adjacent()):
+        total[cell] += (mean[near] * area[near]).sum() / 2
+        weight[cell] += area[near].sum() / 2
+    own = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
+    stops = np.clip(usual - own, -_MOST_STOPS, _MOST_STOPS)
+    return _KEY / math.exp(usual), np.exp(stops)
 
 
 def _notes(lights: list[CellLight]) -> Iterator[str]:
@@ -185,18 +250,14 @@ class LightStage(Stage["Light"]):
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
     recipe = 5
-    changed = (
-        "light is baked by default if it costs little beside the images, and light at vertices "
-        "takes half of the rays"
-    )
+    changed = "light is in colour, of several bounces, and models without lamps have it, too"
     options = LightOptions
-    heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
     optional = True
     opens_inputs = True
 
     def read_with(self, options: LightOptions) -> tuple[Stage[Any], ...]:
-        return () if options.light == "none" else (SCENE, CELLS)
+        return () if options.light == "none" else (SCENE, CELLS, TEXTURES)
 
     def inputs(self, artifacts: Artifacts, options: LightOptions) -> dict[str, str]:
         name = arrays_of(LIGHTS)
@@ -240,7 +301,7 @@ class LightStage(Stage["Light"]):
         self.check_model(run, options)
         import numpy as np
 
-        from ptmtools.light.cells import LEAST, affordable_density, expected_bytes, round_bytes
+        from ptmtools.light.cells import affordable_density, round_bytes
         from ptmtools.light.model import Light
         from ptmtools.output.geometry import Geometry
         from ptmtools.output.pieces import pieces_of
@@ -255,8 +316,7 @@ class LightStage(Stage["Light"]):
         if options.light == "auto" and not model_light:
             density = affordable_density(pieces, asked, round_bytes(image_bytes(run)))
             if not density:
-                least = round(expected_bytes(pieces, LEAST * asked))
-                return complete(work, {**_NO_LIGHT, "too_many_bytes": least}, ())
+                return complete(work, _NO_LIGHT, ())
             options = replace(options, light_density=density)
         if options.light == "auto" and (fault := _absence()):
             left_out = f"lightmaps are left out: {fault.message}"
@@ -267,16 +327,22 @@ class LightStage(Stage["Light"]):
         shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
         cell_lights, total = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
+        factor, exposure = (1.0, np.ones(len(pieces)))
+        horizon = np.zeros((2, 3))
+        if baking.building is not None:
+            factor, exposure = _exposures(cell_lights, cells)
+            daylight = baking.building.field.daylight
+            horizon = factor * np.array([daylight.sky, daylight.ground])
         artifact = Light(
             np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
-            np.ones(len(pieces)),
-            np.ones(len(pieces)),
+            factor * np.array([light.white for light in cell_lights]),
+            exposure,
             np.concatenate([light.lit for light in cell_lights]),
             np.concatenate([light.mapped for light in cell_lights]),
             np.concatenate([light.uv for light in cell_lights]),
             np.concatenate([light.vertex for light in cell_lights]),
-            np.array([[0.8, 0.9, 1.0], [0.3, 0.3, 0.3]]),
-            not model_light,
+            horizon,
+            baking.building is not None,
         )
         run.keep(LIGHT, artifact)
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
@@ -293,27 +359,19 @@ class LightStage(Stage["Light"]):
 
     def summary(self, n: Counts) -> str:
         if not n["lightmaps"]:
-            if not n.get("too_many_bytes"):
-                return "no light"
-            least = size(n["too_many_bytes"])
-            return (
-                f"no light: lightmaps would add {least} or more, too much beside the images "
-                "(--light bake adds them)"
-            )
+            return "no light"
         reduced = n.get("reduced_density", 0.0)
         parts = (
             ("of the model", n.get("light") == "model"),
             ("with lamps", n.get("lamps")),
             ("with the sky", n.get("sky")),
+            ("with ceilings that glow", n.get("ceilings")),
             (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced),
         )
         return (
             f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
             f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
         )
-
-    def tells(self, n: Counts) -> bool:
-        return bool(n.get("too_many_bytes"))
 
     def misfit(self, light: Light, source: Stage[Any], contents: Any) -> str:
         foreign = source is CELLS and len(light.side) != contents.cell_count
