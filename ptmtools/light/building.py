@@ -60,9 +60,6 @@ _SIDE_POINTS, _SIDE_RAYS = 8, 16
 #: Share of rays to what is nearer than half a texel, or to the inside of walls, from which on a
 #: point is covered.
 _COVERED = 0.25
-#: Points whose deviation is more than this share of their light, beside this share of the usual
-#: light, have so many times more rays, turned by this part of a turn.
-_GRAIN, _DIM, _MORE, _AGAIN = 0.1, 0.1, 3, 0.381966
 
 
 @dataclass(frozen=True)
@@ -134,21 +131,14 @@ class GatheredLight:
     samples: int
     near: float
 
-    def indirect(self, face: Ints, point: Floats, turn: Floats) -> tuple[Singles, Singles]:
-        """(n, 3) the light of the sky and of surfaces at points of faces, NaN where covered; (n,)
-        the variance of the mean of its colours. Points with much grain have more rays."""
-        field, normal = self.building.field, self.normal[face]
-        light, blocked, variance = field.gather(point, normal, turn, self.samples, self.near)
-        covered = blocked > _COVERED
-        usual = light.mean(axis=1) + _DIM * self.building.usual
-        grainy = np.flatnonzero((variance > (_GRAIN * usual) ** 2) & ~covered)
-        if len(grainy):
-            again = (turn[grainy] + _AGAIN) % 1.0
-            more = field.gather(point[grainy], normal[grainy], again, _MORE * self.samples)
-            share = np.float32(_MORE / (_MORE + 1))
-            light[grainy] += share * (more.light - light[grainy])
-            variance[grainy] = more.variance * share
-        light[covered] = np.nan
+    def indirect(
+        self, face: Ints, point: Floats, turn: Floats, times: int = 1
+    ) -> tuple[Singles, Singles]:
+        """(n, 3) the light of the sky and of surfaces at points of faces, NaN where covered, by so
+        many times the usual number of rays; (n,) the variance of the mean of its colours."""
+        field, samples = self.building.field, times * self.samples
+        light, blocked, variance = field.gather(point, self.normal[face], turn, samples, self.near)
+        light[blocked > _COVERED] = np.nan
         return light, variance
 
     def direct(self, face: Ints, point: Floats, turn: Floats) -> Singles:

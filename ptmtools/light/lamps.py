@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.arrays import Bools, Floats, Ints, areas, sum_by_group
 from ptmtools.jit import inlined_kernel, kernel
 from ptmtools.light.occlusion import RAYS, Occluders, normals, points_on, spread_over
 from ptmtools.scene.colors import luminance
@@ -199,9 +199,24 @@ def direct_light(
     """(n, 3) the light of lamps, irradiance / pi, at (n, 3) points with (n, 3) normals, by at most
     ``rays`` shadow rays for each point. ``turn``: (n,) shares of the way between two lamps at which
     choosing begins."""
+    sun = lamps.groups()[1]
+    # The light of a sun would be nearly all that could arrive, and nearly everywhere indoors none.
+    parts = [
+        (lamps.only(~sun), rays),
+        *((lamps.only(np.array([k])), 1) for k in np.flatnonzero(sun)),
+    ]
     result = np.zeros((len(point), 3))
-    if not len(lamps):
-        return result
+    for part, count in parts:
+        if len(part):
+            result += _light_with_shadows(around, part, point, normal, turn, count)
+    return result
+
+
+def _light_with_shadows(
+    around: Occluders, lamps: Lamps, point: Floats, normal: Floats, turn: Floats, rays: int
+) -> Floats:
+    """See `direct_light`."""
+    result = np.zeros((len(point), 3))
     step = max(1, RAYS // rays)
     for at in range(0, len(point), step):
         part = slice(at, at + step)
@@ -219,7 +234,7 @@ def direct_light(
         # Of each colour the part that is free: without shadows the light is exact.
         sent = times[row, column, None] * lamps.color[lamp]
         every, arrived = (
-            np.stack([np.bincount(row, part, len(origin)) for part in weight.T], axis=1)
+            np.stack([sum_by_group(row, part, len(origin)) for part in weight.T], axis=1)
             for weight in (sent, sent * free[:, None])
         )
         share = np.divide(arrived, every, out=np.zeros_like(arrived), where=every > 0)

@@ -91,6 +91,12 @@ class TexelGrid:
             value, grain = smooth(value, blur(grain, chart), chart, step, least, _SPLINE)
         return np.where(covered[:, None], np.nan, value[self.row, self.column])
 
+    def blur(self, variance: Singles) -> Singles:
+        """(n,) the mean of (n,) variances over the texels around in each chart."""
+        grain = np.zeros(self.chart.shape, np.float32)
+        grain[self.row, self.column] = variance
+        return blur(grain, self.chart)[self.row, self.column]
+
     def fill(self, light: Singles) -> Singles:
         """(size, size, k) the lightmap of (n, k) light, of which covered texels have NaN."""
         sound = ~np.asarray(np.isnan(light).any(axis=1))
@@ -105,14 +111,14 @@ class TexelGrid:
 
 @kernel
 def blur(variance: NDArray[np.float32], chart: NDArray[np.int32]) -> NDArray[np.float32]:
-    """(h, w) the mean of the variances of each texel and of the eight around it in its chart."""
+    """(h, w) the mean of the variances of the 7 × 7 texels around each in its chart."""
     height, width = variance.shape
     result = np.zeros_like(variance)
     for row in range(height):
         for column in range(width):
             total, count = 0.0, 0
-            for r in range(max(row - 1, 0), min(row + 2, height)):
-                for c in range(max(column - 1, 0), min(column + 2, width)):
+            for r in range(max(row - 3, 0), min(row + 4, height)):
+                for c in range(max(column - 3, 0), min(column + 4, width)):
                     if chart[r, c] == chart[row, column]:
                         total += variance[r, c]
                         count += 1
