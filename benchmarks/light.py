@@ -33,6 +33,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from ptmtools.light.mixing import LightMix, light_mix
 from scenes import model_file
 
 from ptmtools.arrays import Bools, Floats, areas
@@ -42,7 +43,6 @@ from ptmtools.light.cells import ABOVE, COVERED, WHITE, LightBaking, encode, exp
 from ptmtools.light.lamps import lamps_of
 from ptmtools.light.lightmap import bake
 from ptmtools.light.looks import LightImage, PaintedLight, RayLight, lookup
-from ptmtools.light.mixing import LightMix, light_mix
 from ptmtools.light.model import CellSurfaces
 from ptmtools.light.occlusion import Occluders, light, normals, points_on, spread_over, turns
 from ptmtools.light.options import LightOptions

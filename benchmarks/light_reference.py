@@ -42,6 +42,7 @@ from PIL import Image
 from scenes import ROOT, model_file
 
 from ptmtools.arrays import Floats, Singles
+from ptmtools.rendering.tone import neutral
 from ptmtools.scene.colors import luminance, to_linear, to_srgb
 from ptmtools.scene.model import Material
 from ptmtools_lab.measures import flip
@@ -78,21 +79,10 @@ class EyeView:
     field: float = 60.0
 
 
-def neutral(light: Floats) -> Floats:
-    """Khronos PBR Neutral: (…, 3) exposed linear light to [0, 1]."""
-    start, desaturation = 0.8 - 0.04, 0.15
-    least = light.min(axis=-1, keepdims=True)
-    color = light - np.where(least < 0.08, least - 6.25 * least**2, 0.04)
-    peak = np.maximum(color.max(axis=-1, keepdims=True), 1e-9)
-    rest = 1 - start
-    top = 1 - rest * rest / (np.maximum(peak, start) + rest - start)
-    kept = 1 / (desaturation * (peak - top) + 1)
-    return np.where(peak < start, color, color * top / peak * kept + top * (1 - kept))
-
-
 def displayed(light: Floats, exposure: float) -> Floats:
     """The picture of linear light, 0 to 255."""
-    return 255 * to_srgb(neutral(np.maximum(light, 0) * exposure))
+    radiance = np.maximum(light, 0) * exposure
+    return 255 * to_srgb(neutral(radiance.reshape(-1, 3)).reshape(radiance.shape))
 
 
 def exposure_of(light: Floats) -> float:
@@ -100,6 +90,15 @@ def exposure_of(light: Floats) -> float:
     bright = luminance(light)
     low, high = np.maximum(np.quantile(bright, (0.02, 0.98)), 1e-6)
     return float(KEY / np.exp(np.log(np.clip(bright, low, high)).mean()))
+
+
+def exposure_like(light: Floats, picture: Floats) -> float:
+    """The factor of linear light whose displayed picture is nearest to another."""
+    best = exposure_of(light)
+    for ratio in (1.5, 1.2, 1.05):
+        tries = [best * ratio**k for k in range(-4, 5)]
+        best = min(tries, key=lambda factor: rms(displayed(light, factor), picture))
+    return best
 
 
 class PathTracer:
@@ -360,16 +359,19 @@ def compare(name: str, given: argparse.Namespace) -> None:
     table = []
     for k, view in enumerate(views):
         traced = {kind: tracer.trace(view, size, given.noise) for kind, tracer in tracers.items()}
-        exposure = exposure_of(traced["whole"][0])
-        truth = {kind: displayed(light, exposure) for kind, (light, _) in traced.items()}
         file = given.out / f"{Path(name).stem}-{k}.png"
         shown = {light: render(db, view, size, file) for light, db in databases.items()}
-        pairs = [(truth[kind], picture) for picture in shown.values() for kind in truth]
+        pairs = [
+            (displayed(light, exposure_like(light, picture)), picture)
+            for picture in shown.values()
+            for light, _ in traced.values()
+        ]
+        truth = [pair[0] for pair in pairs[-len(traced) :]]
         row = [(rms(*pair), flip(*pair)) for pair in pairs]
         table.append(row)
         noise = max(error for _, error in traced.values())
         print(f"| {k} | {noise:.1f} | {' | '.join(cells_of(row))} |", flush=True)
-        beside = np.concatenate([*shown.values(), *truth.values()], axis=1)
+        beside = np.concatenate([*shown.values(), *truth], axis=1)
         Image.fromarray(np.rint(beside).astype(np.uint8)).save(file)
     means = [tuple(map(float, pair)) for pair in np.mean(table, axis=0)]
     print(f"| **mean** | | {' | '.join(cells_of(means))} |")

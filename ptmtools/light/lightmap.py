@@ -30,6 +30,8 @@ from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
 #: Distances of the texels of each round, and by how many deviations their light differs.
 _STEPS, _APART = (1, 2, 4, 8), 3.0
+#: Texels by which what is open grows into what is covered: beyond, the light of other rooms counts.
+_GROWN = 2
 #: Weights of texels at a distance of 0, 1 and 2 steps.
 _SPLINE = np.array([3 / 8, 1 / 4, 1 / 16], np.float32)
 
@@ -106,6 +108,8 @@ class TexelGrid:
         known = np.zeros(self.chart.shape, np.bool_)
         value[self.row[sound], self.column[sound]] = light[sound]
         known[self.row[sound], self.column[sound]] = True
+        for _ in range(_GROWN):
+            value, known = grow(value, known, self.chart)
         return fill(value, known)
 
 
@@ -167,6 +171,32 @@ def smooth(
                 result[row, column, k] /= weight
             rest[row, column] = total / (weight * weight)
     return result, rest
+
+
+@kernel
+def grow(
+    value: NDArray[np.float32], known: Bools, chart: NDArray[np.int32]
+) -> tuple[NDArray[np.float32], Bools]:
+    """The (h, w, k) values and the (h, w) known ones, with those next to known ones in their
+    chart, which have the mean of these."""
+    height, width, channels = value.shape
+    result, grown = value.copy(), known.copy()
+    for row in range(height):
+        for column in range(width):
+            if known[row, column] or chart[row, column] < 0:
+                continue
+            count = 0
+            for r in range(max(row - 1, 0), min(row + 2, height)):
+                for c in range(max(column - 1, 0), min(column + 2, width)):
+                    if known[r, c] and chart[r, c] == chart[row, column]:
+                        count += 1
+                        for k in range(channels):
+                            result[row, column, k] += value[r, c, k]
+            if count > 0:
+                grown[row, column] = True
+                for k in range(channels):
+                    result[row, column, k] /= count
+    return result, grown
 
 
 def fill(value: Singles, known: Bools) -> Singles:
