@@ -15,7 +15,8 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.lossy import pictures
 from ptmtools.rendering.rays import Caster, RayCamera
-from ptmtools.rendering.records import Shows, Sight, own_levels, triangles_of
+from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels
+from ptmtools.rendering.tone import LitSurfaces, show_vertex_light, tone_at
 
 if TYPE_CHECKING:
     from ptmtools_lab.world import World
@@ -38,7 +39,10 @@ class FrameRenderer:
             camera.aspect,
             camera.lines,
         )
-        self._triangles = triangles_of(world.served.surfaces)
+        #: Pictures with a lamp, or against another database, show no lightmaps.
+        self._served = show_vertex_light(world.served) if world.relief else world.served
+        self._light = LitSurfaces(self._served)
+        self._triangles = self._light.triangles
         self._caster = Caster(world.served.surfaces)
         self._lamps = lamps(world.served.surfaces.corner) if world.relief else np.zeros(0)
 
@@ -64,7 +68,7 @@ class FrameRenderer:
         return self._draw(sight, self._full, loaded, last)
 
     def _draw(self, sight: Sight, shows: Shows, loaded: Bools, column: Ints) -> Floats:
-        from ptmtools.rendering.kernels import shade
+        from ptmtools.rendering.kernels import GREY, shade
         from ptmtools.rendering.normal_maps import show_bumps, show_relief
 
         surfaces, shown = self._world.served.surfaces, np.empty((len(sight.ray), 3))
@@ -76,6 +80,16 @@ class FrameRenderer:
             resident = column[first : first + octrees.number]
             relieve(sight, self._triangles, self._lamps, octrees, loaded, resident, shown)
             show_relief(sight, surfaces, shows, loaded, column, self._lamps, shown)
+        elif tone := tone_at(self._served, sight.eye):
+
+            def codes(part: Sight, maps: Triangles) -> Floats:
+                result = np.empty((len(part.ray), 3))
+                shade(part, maps, shows, loaded, column, result)
+                return result
+
+            missing = (sight.triangle >= 0) & ~loaded[self._triangles.cell[sight.triangle]]
+            self._light.show(sight, tone, codes, shown)
+            shown[missing] = GREY
         show_bumps(sight, surfaces, shows, loaded, column, shown)
         return self._picture(shown)
 

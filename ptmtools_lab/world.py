@@ -24,6 +24,7 @@ from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Frustum, RayCamera
 from ptmtools.rendering.records import Lossy, Pyramids, Shows
+from ptmtools.rendering.tone import show_vertex_light
 from ptmtools.site.client import ITEM_PIXELS
 from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps
 from ptmtools.walk import Browser
@@ -191,7 +192,13 @@ def prepare(
         drawing = drawing._replace(lossy=lossy)
         eyes, directions = poses[:, :3], poses[:, 3:]
         views, *form_views = look(
-            served.surfaces, textures, camera, eyes, directions, progress, drawing
+            show_vertex_light(served).surfaces,
+            textures,
+            camera,
+            eyes,
+            directions,
+            progress,
+            drawing,
         )
     catalogue = catalogue_of(served, textures.differences, textures.mean)
     catalogue = catalogue.with_browser_sizes(browser) if browser else catalogue
@@ -277,7 +284,8 @@ def relief_of(
             )
         full = read_pyramids(against, progress)
         same = all(np.array_equal(full[k], pyramids[k]) for k in range(len(full)))
-        reference = Reference(against.surfaces, pyramids if same else full)
+        surfaces = show_vertex_light(against).surfaces
+        reference = Reference(surfaces, pyramids if same else full)
     octrees = read_octrees(served) if lit else no_octrees(served.surfaces)
     return Relief(octrees, reference)
 

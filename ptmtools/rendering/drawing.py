@@ -137,11 +137,11 @@ def draw_view(
     from ptmtools.rendering.layers import Layers, blend, transparent_of
     from ptmtools.rendering.light import with_lamp
     from ptmtools.rendering.painting import SurfacePainter
-    from ptmtools.rendering.tone import show_vertex_light, tone_at
+    from ptmtools.rendering.tone import tone_at
 
     eye = eye_of(served, options)
     if options.lit:
-        served = with_lamp(show_vertex_light(served))
+        served = with_lamp(served)
     surfaces = served.surfaces
     samples = _SAMPLES if options.width * options.height <= _MANY_PIXELS else 1
     camera = RayCamera(

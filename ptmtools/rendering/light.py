@@ -1,4 +1,4 @@
-"""Light of pictures without baked light: what shows, and a distant lamp with ambient light.
+"""Light of lit pictures, which have no baked light: a distant lamp, and ambient light.
 
 The lamp wraps around objects (half Lambert, squared), so relief is visible on all sides of a
 statue. It multiplies sRGB values, like the rest of the simulator.
@@ -13,12 +13,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, normals
 from ptmtools.output.served import Served
+from ptmtools.rendering.tone import show_vertex_light
 
-#: Colour of the sky, 0 to 255, as on the web page.
-SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
-#: Least share of their colour that surfaces without texture and light show, and in buildings that
-#: have light.
-GLOW, LIT_GLOW = 0.25, 0.7
 #: Share of ambient light, and unit vector towards the lamp.
 AMBIENT = 0.3
 LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 0.7, 0.6]))
@@ -38,8 +34,9 @@ def light_on(normal: Floats) -> Floats:
 
 
 def with_lamp(served: Served) -> Served:
-    """Returns the database with colours multiplied by the light of the lamp."""
-    surfaces = served.surfaces
+    """Returns the database with colours multiplied by the light of the lamp, beside that at
+    vertices."""
+    surfaces = show_vertex_light(served).surfaces
     color = surfaces.color * lamps(surfaces.corner)[:, None]
     return replace(served, surfaces=replace(surfaces, color=color))
 

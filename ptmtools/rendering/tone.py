@@ -23,10 +23,14 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.footprints import corner_values, show_colors
-from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.scene.colors import to_linear, to_srgb
 
+#: Colour of the background in buildings without light, 0 to 255, as on the web page.
+SKY = (0.16 * 255, 0.17 * 255, 0.19 * 255)
+#: Least share of their colour that surfaces without texture and light show, and in buildings that
+#: have light.
+GLOW, LIT_GLOW = 0.25, 0.7
 #: Greatest component of radiance that the curve keeps, and how fast brighter colours fade to white.
 SHOULDER, FADING = 0.8, 0.15
 #: Sine of the angle to the horizon at which the background is all sky, or all ground below it.

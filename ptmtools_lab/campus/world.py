@@ -37,6 +37,7 @@ from ptmtools.rendering.kernels import GREY, blend, distance, texel_under
 from ptmtools.rendering.pyramids import full_colors, read_pyramids
 from ptmtools.rendering.rays import Caster, Frustum, RayCamera
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
+from ptmtools.rendering.tone import show_vertex_light
 from ptmtools.walk import Walk
 from ptmtools_lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
 from ptmtools_lab.track import RATE, frame_times
@@ -328,7 +329,7 @@ def prepare_campus(
         full = FullPicture(finest, large)
         if served is not None:
             textures = read_pyramids(served, progress) if pyramids is None else pyramids
-            full = FullPicture(served.surfaces, textures)
+            full = FullPicture(show_vertex_light(served).surfaces, textures)
         camera = RayCamera(*frames.pixels, walk.field_of_view, walk.aspect)
         sizes = small, middle, large
         tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)

@@ -15,10 +15,10 @@ from ptmtools.output.surfaces import LEAST_ALPHA, Surfaces
 from ptmtools.progress import silent
 from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.layers import MOST, Layers, blend, transparent_of
-from ptmtools.rendering.light import GLOW
 from ptmtools.rendering.painting import SurfacePainter
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Sight, triangles_of
+from ptmtools.rendering.tone import GLOW
 from tests.lab.worlds import SEEDS
 
 AHEAD = np.array([0.0, 0.0, -1.0])

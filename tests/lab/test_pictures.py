@@ -56,7 +56,7 @@ def card() -> Any:
         differences=np.zeros((1, 2)),
     )
     return SimpleNamespace(
-        served=SimpleNamespace(surfaces=surfaces),
+        served=SimpleNamespace(surfaces=surfaces, index={}),
         relief=None,
         pyramids=textures,
         lossy=no_previews(1),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,16 @@ from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import silent
 from ptmtools.rendering.drawing import ViewOptions, draw_view
-from ptmtools.rendering.light import GLOW, LIT_GLOW, SKY
+from ptmtools.rendering.kernels import GREY
+from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.painting import SurfacePainter
 from ptmtools.rendering.pyramids import pack_pyramids
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Sight
-from ptmtools.rendering.tone import Tone, show_vertex_light, tone_of
+from ptmtools.rendering.tone import GLOW, LIT_GLOW, SKY, Tone, show_vertex_light, tone_of
+from ptmtools.scene.colors import to_linear
 from ptmtools.site.pictures import PictureKind, _Scene, _Textures
+from ptmtools_lab.renderer import FrameRenderer
 from tests.lab.worlds import leaf
 
 STOPS, SKY_LIGHT, GROUND_LIGHT = 10, (0.7, 0.9, 1.3), (0.3, 0.25, 0.2)
@@ -194,6 +198,38 @@ def test_pictures_show_light_by_the_formula(
     tone = light["tone"] if light else None
     expected = expected_colors(sight, tone, exposure if tone == "neutral" else 1.0)
     np.testing.assert_allclose(actual, expected, atol=1e-6)
+
+
+def test_frames_of_the_simulator_show_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what a client has: of a lightmap without levels, the mean code. A cell without geometry
+    is grey."""
+    served, pyramids = strips(NEUTRAL, 2.0), pack_pyramids(levels())
+    pyramids = pyramids._replace(mean=np.array([TEXEL, np.mean(CODES, axis=0)], np.float64))
+    world: Any = SimpleNamespace(
+        served=served,
+        relief=None,
+        pyramids=pyramids,
+        lossy=no_previews(2),
+        camera=CAMERA,
+        catalogue=SimpleNamespace(cell_count=1),
+        shows=None,
+    )
+    renderer = FrameRenderer(world, CAMERA.height, samples=1)
+    sight, there = renderer.look(np.zeros(3), AHEAD), np.ones(1, np.bool_)
+    tone = tone_of(served.index, 0)
+    assert tone
+    expected = painted(served, sight, tone, monkeypatch)
+    np.testing.assert_allclose(renderer.full(sight).reshape(-1, 3), expected)
+    hit = sight.triangle >= 0
+    wall = hit & (sight.triangle < 2)
+    bare = renderer.colors(sight, there, np.array([1, 0])).reshape(-1, 3)
+    base = to_linear(np.array(TEXEL) / 255) * FACTOR
+    light = tone.light(np.array([WHITE[0]]), pyramids.mean[1:])
+    np.testing.assert_allclose(bare[wall], np.repeat(tone.display(base * light), wall.sum(), 0))
+    np.testing.assert_allclose(bare[~wall], expected[~wall])
+    grey = renderer.colors(sight, ~there, np.array([1, 2])).reshape(-1, 3)
+    assert (grey[hit] == GREY).all()
+    np.testing.assert_allclose(grey[~hit], expected[~hit])
 
 
 def test_an_eye_has_the_exposure_of_its_cell(monkeypatch: pytest.MonkeyPatch) -> None:
