@@ -53,7 +53,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/pipeline": (3_680, 19),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (1_770, 13),
-    "ptmtools/scene": (9_330, 47),
+    "ptmtools/scene": (9_520, 47),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_600, 25),

@@ -16,16 +16,16 @@ import os
 import re
 import unicodedata
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
+from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
 from ptmtools.scene.notes import IngestNotes
@@ -49,6 +49,7 @@ _STRIP_TEXELS = 1 << 20
 _MASK_BANDS = {"r": "R", "g": "G", "b": "B"}
 
 _Bits = NDArray[np.uint8]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -248,6 +249,56 @@ def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
     if picture.texels.dtype.kind != "u":
         raise InputError("PTM-I126", "images of floats cannot be combined or converted")
     return picture.texels[0 : picture.texels.shape[0]], picture.description
+
+
+class OptionalImages:
+    """Images that a model is drawn without: each is read and decoded once for each use, and damage
+    is a note. A use is a function of the bytes and of the limit of the ``store``."""
+
+    def __init__(self, store: ImageStore, notes: IngestNotes) -> None:
+        self._store, self.notes = store, notes
+        self._results = dict[tuple[Callable[[], bytes], Hashable], Any]()
+
+    def read(self, texture: SourceTexture, use: Callable[[bytes, int], T]) -> T | None:
+        """``use`` of an image; None, and a note, if it cannot be read or decoded."""
+        self.read_all((texture,), use, 1)
+        return cast("T | None", self._results[texture.read, use])
+
+    def read_all(
+        self, textures: Iterable[SourceTexture], use: Callable[[bytes, int], object], workers: int
+    ) -> None:
+        """Reads images with ``workers`` threads for the same ``use``."""
+        pending: dict[Callable[[], bytes], SourceTexture] = {}
+        for texture in textures:
+            if (texture.read, use) not in self._results:
+                pending.setdefault(texture.read, texture)
+
+        def attempt(texture: SourceTexture) -> object:
+            try:
+                return use(read_within(texture, self._store.limit), self._store.limit)
+            except (PtmError, OSError) as fault:
+                return fault
+
+        with warnings.catch_warnings(action="ignore"), ThreadPoolExecutor(workers) as pool:
+            results = list(pool.map(attempt, pending.values()))
+        for texture, result in zip(pending.values(), results, strict=True):
+            self._store.mark_as_input(texture)
+            if isinstance(result, PtmError | OSError):
+                message = result.message if isinstance(result, PtmError) else str(result)
+                self.notes.note("PTM-N206", f"{texture.what}: {message}", texture.place)
+            self._results[texture.read, use] = None if isinstance(result, Exception) else result
+
+
+def mean_values(data: bytes, limit: int) -> tuple[float, ...]:
+    """The mean red, green, blue and alpha of an image as encoded, from 0 to 1; all colours of a
+    grey one are alike. Raises as `integers`."""
+    texels, _ = integers(data, limit)
+    bands = texels.shape[2]
+    channels = [0, 1, 2] if bands > 2 else [0, 0, 0]
+    means = [float(texels[..., channel].mean()) for channel in channels]
+    largest = float(np.iinfo(texels.dtype).max)
+    means.append(float(texels[..., -1].mean()) if bands in (2, 4) else largest)
+    return tuple(mean / largest for mean in means)
 
 
 def is_plain(data: bytes, name: str, limit: int) -> bool:

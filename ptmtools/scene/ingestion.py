@@ -23,8 +23,8 @@ from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.formats import ModelFormat, format_of
-from ptmtools.scene.images import ImageStore
-from ptmtools.scene.lighting import LightImages, add_maps, lights_of
+from ptmtools.scene.images import ImageStore, OptionalImages
+from ptmtools.scene.lighting import add_maps, lights_of
 from ptmtools.scene.lights import Lights
 from ptmtools.scene.materials import SceneMaterials, gather_materials
 from ptmtools.scene.model import Camera, RoomVolume, Scene, Space, Storey
@@ -227,7 +227,7 @@ def place_faces(draft: Draft) -> None:
 def find_lights(draft: Draft) -> None:
     """Gathers the lights. Raises as the reader of the format."""
     used, second = draft.surfaces.used, draft.format.second
-    images = LightImages(draft.store, draft.notes)
+    images = OptionalImages(draft.store, draft.notes)
     draft.lights = lights_of(draft.source, used, draft.space, images)
     read = second.load()(draft.model, draft.options, "lightmap") if second else None
     if read is not None:

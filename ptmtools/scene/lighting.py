@@ -7,23 +7,18 @@ because most builds do not need it.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from ptmtools.arrays import Ints, plane_areas
-from ptmtools.errors import PtmError
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.faces import KeptFaces
-from ptmtools.scene.images import ImageStore, integers, read_within
+from ptmtools.scene.images import OptionalImages, integers
 from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap, Radiance
 from ptmtools.scene.model import Space
-from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.orientation.space import rotate, to_world
-from ptmtools.scene.source import ModelSource, SecondReading, SourceMaterial, SourceTexture
+from ptmtools.scene.source import ModelSource, SecondReading, SourceMaterial
 from ptmtools.texture.model import Limits
 
 #: Coordinates may be this far outside of an image that lies on its surfaces once.
@@ -33,20 +28,18 @@ _FAR = 1e6
 #: Texels that are counted at a time.
 _STRIP_TEXELS = 1 << 20
 
-T = TypeVar("T")
-
 
 def lights_of(
     source: ModelSource,
     used: Ints,
     space: Space,
-    images: LightImages,
+    images: OptionalImages,
 ) -> Lights:
     """The lights of a model without its lightmaps. ``used``: (M,) the materials of the scene by
     their numbers in the source."""
     materials = [source.materials[number] for number in used.tolist()]
     return Lights(
-        np.array([images.glow(material) for material in materials], np.float32).reshape(-1, 3),
+        np.array([_glow(material, images) for material in materials], np.float32).reshape(-1, 3),
         np.array([material.unlit for material in materials], np.bool_),
         tuple(_place(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
@@ -55,58 +48,26 @@ def lights_of(
     )
 
 
-class LightImages:
-    """The images of lights, each read and decoded once."""
+def _glow(material: SourceMaterial, images: OptionalImages) -> Radiance:
+    """The linear radiance that a material emits, on average."""
+    red, green, blue = (min(max(0.0, part), MOST) for part in material.glow)
+    glow = red, green, blue
+    if glow != material.glow:
+        before, after = (" ".join(f"{v:g}" for v in part) for part in (material.glow, glow))
+        text = f"{material.name}: emission of {before} changed to {after}"
+        images.notes.note("PTM-N215", text)
+    if not any(glow) or material.glow_map is None:
+        return glow
+    mean = images.read(material.glow_map, _mean)
+    return glow if mean is None else (red * mean[0], green * mean[1], blue * mean[2])
 
-    def __init__(self, store: ImageStore, notes: IngestNotes) -> None:
-        self._store, self.notes = store, notes
-        self._means = dict[Callable[[], bytes], Radiance | None]()
-        self._maps = dict[Callable[[], bytes], bytes | None]()
-        self._held = dict[bytes, bytes]()
 
-    def glow(self, material: SourceMaterial) -> Radiance:
-        """The linear radiance that a material emits, on average."""
-        red, green, blue = (min(max(0.0, part), MOST) for part in material.glow)
-        glow = red, green, blue
-        if glow != material.glow:
-            before, after = (" ".join(f"{v:g}" for v in part) for part in (material.glow, glow))
-            text = f"{material.name}: emission of {before} changed to {after}"
-            self.notes.note("PTM-N215", text)
-        if not any(glow) or material.glow_map is None:
-            return glow
-        mean = self._read(material.glow_map, self._means, _mean)
-        return glow if mean is None else (red * mean[0], green * mean[1], blue * mean[2])
+def _lightmap(data: bytes, limit: int) -> bytes:
+    """The bytes of a lightmap that can be decoded. Raises as `load_image`."""
+    from ptmtools.texture.images.files import load_image
 
-    def lightmap(self, texture: SourceTexture) -> bytes | None:
-        """The bytes of a lightmap that can be decoded; equal ones are the same object. None, and a
-        note, for others."""
-        from ptmtools.texture.images.files import load_image
-
-        def check(data: bytes, limit: int) -> bytes:
-            load_image(data, Limits(limit)).array()
-            return self._held.setdefault(data, data)
-
-        return self._read(texture, self._maps, check)
-
-    def _read(
-        self,
-        texture: SourceTexture,
-        results: dict[Callable[[], bytes], T | None],
-        use: Callable[[bytes, int], T],
-    ) -> T | None:
-        """``use(data, limit)`` for the bytes of an image; None, and a note, if it cannot be read or
-        decoded."""
-        if texture.read not in results:
-            self._store.mark_as_input(texture)
-            results[texture.read] = None
-            try:
-                data = read_within(texture, self._store.limit)
-                with warnings.catch_warnings(action="ignore"):
-                    results[texture.read] = use(data, self._store.limit)
-            except (PtmError, OSError) as fault:
-                message = fault.message if isinstance(fault, PtmError) else str(fault)
-                self.notes.note("PTM-N206", f"{texture.what}: {message}", texture.place)
-        return results[texture.read]
+    load_image(data, Limits(limit)).array()
+    return data
 
 
 def _mean(data: bytes, limit: int) -> Radiance:
@@ -132,7 +93,7 @@ def _place(lamp: Lamp, space: Space) -> Lamp:
 
 
 def add_maps(
-    plain: Lights, read: SecondReading, kept: KeptFaces, used: Ints, images: LightImages
+    plain: Lights, read: SecondReading, kept: KeptFaces, used: Ints, images: OptionalImages
 ) -> Lights:
     """The lights of the kept faces with the lightmaps of the model, as a second reading has them;
     ``used`` as in `lights_of`."""
@@ -144,6 +105,7 @@ def add_maps(
     material = read.source.triangle_material[kept.source]
     index = np.full(len(used), -1, np.int32)
     maps: dict[ModelMap, int] = {}
+    kept_bytes: dict[bytes, bytes] = {}
     for number, original in enumerate(used.tolist()):
         texture, place = read.source.materials[original].texture, uv[material == original]
         if texture is None:
@@ -156,7 +118,8 @@ def add_maps(
         ways = texture.wrap_s, texture.wrap_t
         if (outside.any(axis=(0, 1)) & [way != "clamp" for way in ways]).any():
             continue
-        if (data := images.lightmap(texture)) is not None:
+        if (data := images.read(texture, _lightmap)) is not None:
+            data = kept_bytes.setdefault(data, data)
             index[number] = maps.setdefault(ModelMap(data, ways, texture.strength), len(maps))
     if not maps:
         return plain

@@ -16,15 +16,17 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.progress import Progress
 from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces
-from ptmtools.scene.images import ImageStore
+from ptmtools.scene.images import ImageStore, OptionalImages, mean_values
 from ptmtools.scene.model import Material
 from ptmtools.scene.normal_maps import NormalMaps
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.source import ModelSource, SourceMaterial
+from ptmtools.scene.source import ModelSource, SourceMaterial, SourceTexture
 from ptmtools.scene.texels import uses_holes
 
 #: Default colours: of faces without an image, and of images.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
+#: The place of a channel in `mean_values`.
+_CHANNELS = {"r": 0, "g": 1, "b": 2, "m": 3}
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,9 @@ def gather_materials(
     colors = None if source.colors is None else source.colors[kept.source]
     if colors is not None and (colors == 255).all():
         colors = None
+    images = OptionalImages(store, notes)
+    maps = (m for o in originals for m in (o.metallic_map, o.roughness_map, o.gloss_map) if m)
+    images.read_all(maps, mean_values, workers)
     materials = []
     for done, (material, rows) in enumerate(zip(baked, faces, strict=True)):
         progress(done, len(faces), "materials")
@@ -73,12 +78,14 @@ def gather_materials(
             tint = np.array(material.color or WHITE)
             colors[rows] = np.rint(colors[rows] * tint).astype(np.uint8)
             material = replace(material, color=WHITE)
-        materials.append(_material(material, uv[rows], store, notes))
-    maps = NormalMaps(store, notes)
+        metallic, roughness = _matter(material, images)
+        emitted = _material(material, uv[rows], store, notes)
+        materials.append(replace(emitted, metallic=metallic, roughness=roughness))
+    normal_maps = NormalMaps(store, notes)
     for number, rows in enumerate(faces):
         if (normal := originals[number].normal) is not None:
             moved = uv is not written and not np.array_equal(uv[rows], written[rows])
-            image = maps.add(normal, baked[number].texture, moved=moved)
+            image = normal_maps.add(normal, baked[number].texture, moved=moved)
             materials[number] = replace(materials[number], normal=image)
     normal_uv = _normal_coordinates(source, kept, materials, triangle_material, written)
     progress(len(faces), len(faces), "materials")
@@ -130,6 +137,32 @@ def _normal_coordinates(
     repeats = np.array([[wrap == "repeat" for wrap in pair] for pair in wraps], np.bool_)
     owner = source.triangle_object[kept.source]
     return near_origin(result, material * np.int64(len(source.objects)) + owner, repeats[material])
+
+
+def _matter(material: SourceMaterial, images: OptionalImages) -> tuple[float, float]:
+    """Metallic and roughness of a material, on average; 0 and 1 where an image cannot be read."""
+
+    def share(name: str, value: float) -> float:
+        clipped = min(max(0.0, value), 1.0)
+        if clipped != value:
+            text = f"{material.name}: {name} of {value:g} changed to {clipped:g}"
+            images.notes.note("PTM-N215", text)
+        return clipped
+
+    def mean(image: SourceTexture) -> float | None:
+        means = images.read(image, mean_values)
+        return None if means is None else means[_CHANNELS.get(image.channel, 0)]
+
+    metallic = share("metallic", material.metallic)
+    roughness = share("roughness", material.roughness)
+    if material.metallic_map is not None:
+        metallic *= mean(material.metallic_map) or 0.0
+    if material.roughness_map is not None:
+        known = mean(material.roughness_map)
+        roughness = 1.0 if known is None else roughness * known
+    if material.gloss_map is not None:
+        roughness = 1.0 - (1.0 - roughness) * (mean(material.gloss_map) or 0.0)
+    return round(metallic, 3), round(roughness, 3)
 
 
 def _material(

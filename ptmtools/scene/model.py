@@ -85,6 +85,7 @@ class Material:
     cutoff: texels with less alpha than this, in [0, 1], are not drawn, and all others are opaque;
         None if texels are blended.
     normal: its normal map, or None.
+    metallic, roughness: in [0, 1], as in glTF, on average.
     """
 
     name: str
@@ -96,6 +97,8 @@ class Material:
     transparent: bool = False
     cutoff: float | None = None
     normal: NormalImage | None = None
+    metallic: float = 0.0
+    roughness: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Reads MTL, the materials of an OBJ file.
 
 The reader keeps the statements that the emitted files use: ``Kd``, ``d``/``Tr``, ``map_Kd``,
-``map_d``, ``norm`` and ``bump``/``map_Bump``, ``Ke`` and ``map_Ke`` for light, and ``map_Ks`` for a
-campus. It ignores those of physically based extensions (``Pr``, …). The format has no quoting, so
-the name of a texture is the rest of the statement after the last option, spaces included.
+``map_d``, ``norm`` and ``bump``/``map_Bump``, ``Ke`` and ``map_Ke`` for light, ``Pm``, ``Pr`` and
+their maps, or else ``Ks``, ``Ns`` and ``illum``, for reflections, and ``map_Ks`` for a campus. The
+format has no quoting, so the name of a texture is the rest of the statement after the last option,
+spaces included.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from ptmtools.scene.source import decode
 
 #: Size limit of a library, MiB; those of whole cities have a few.
 LARGEST = 64
+#: Least ``illum`` of a material with highlights, and ``Ns`` of a mirror.
+_HIGHLIGHTS, _SHARPEST = 2, 1000.0
 #: Options of a texture statement with their smallest and largest number of arguments: words, and
 #: numbers.
 _WORDS = dict.fromkeys(("-blendu", "-blendv", "-cc", "-clamp", "-imfchan", "-type"), (1, 1))
@@ -113,8 +116,9 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
 class MtlMaterial:
     """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or else 1 - ``Tr``. An invalid
     ``map_Ks`` is no miss, since few builds use it; ``map_ks_fault`` is its error. Nor is an invalid
-    ``Ke`` or ``map_Ke``, which then has no effect. ``glow`` is linear light. ``relief`` is the last
-    of ``norm``, a normal map, and ``bump`` or ``map_Bump``, with its keyword."""
+    ``Ke`` or ``map_Ke``, which then has no effect, nor one of `_MATTER`. ``glow`` is linear light.
+    ``ks`` is the largest part of ``Ks``. ``relief`` is the last of ``norm``, a normal map, and
+    ``bump`` or ``map_Bump``, with its keyword."""
 
     library: Path
     color: tuple[float, float, float] | None = None
@@ -127,6 +131,23 @@ class MtlMaterial:
     relief: tuple[str, MapStatement] | None = None
     glow: tuple[float, float, float] | None = None
     map_ke: MapStatement | None = None
+    pm: float = 0.0
+    pr: float | None = None
+    map_pm: MapStatement | None = None
+    map_pr: MapStatement | None = None
+    illum: float = 0.0
+    ks: float = 0.0
+    ns: float = 0.0
+
+    @property
+    def roughness(self) -> float:
+        """As stated, or else by the exponent of the highlight, which Blender writes as
+        1000 (1 - roughness)²; 1 without a highlight."""
+        if self.pr is not None:
+            return self.pr
+        if self.ks <= 0 or self.illum < _HIGHLIGHTS:
+            return 1.0
+        return 1.0 - math.sqrt(min(max(0.0, self.ns / _SHARPEST), 1.0))
 
 
 def read_mtl(path: Path, notes: IngestNotes) -> dict[str, MtlMaterial]:
@@ -164,7 +185,10 @@ def read_mtl(path: Path, notes: IngestNotes) -> dict[str, MtlMaterial]:
                 _statement(current, key, rest, index)
             except ValueError as error:
                 message = f"invalid statement {line.strip()[:80]} ({error})"
-                notes.miss("PTM-N214", message, place)
+                if key in _MATTER:
+                    notes.note("PTM-N215", message, place)
+                else:
+                    notes.miss("PTM-N214", message, place)
     return materials
 
 
@@ -178,6 +202,20 @@ def _share(words: list[str]) -> float:
 def _is_normal_map(material: MtlMaterial) -> bool:
     """Whether the relief is that of ``norm``, which ``bump`` repeats for older readers."""
     return material.relief is not None and material.relief[0] == "norm"
+
+
+#: Statements of reflections, without which a material is drawn all the same.
+_MATTER = ("pm", "pr", "map_pm", "map_pr", "illum", "ks", "ns")
+
+
+def _matter_value(key: str, rest: str, line: int) -> MapStatement | float:
+    """The value of a statement of `_MATTER`; of a colour the largest part."""
+    if key.startswith("map_"):
+        return parse_map(rest, line)
+    numbers = [number(word) for word in rest.split()[: 3 if key == "ks" else 1]]
+    if not numbers:
+        raise ValueError("a number is missing")
+    return max(numbers)
 
 
 def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
@@ -206,6 +244,8 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
     elif key == "map_ke":
         with suppress(ValueError):
             material.map_ke = parse_map(rest, line)
+    elif key in _MATTER:
+        setattr(material, key, _matter_value(key, rest, line))
     elif key == "map_ks":
         try:
             material.map_ks, material.map_ks_fault = parse_map(rest, line), ""

@@ -85,6 +85,7 @@ def resolve_materials(
                 shine=_shine(material),
                 normal=normal,
                 **_glow(material, notes, index in used),
+                **_matter(material, notes, index in used),
             )
         )
     return tuple(materials), maps
@@ -140,13 +141,33 @@ def _glow(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, An
     glow = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
     if not (used and any(glow)):
         return {}
-    image = None
-    if material.map_ke is not None:
-        base, name = material.library.parent, material.map_ke.file
-        file = notes.folder.find(name, base).path
-        place = f"{notes.folder.label(material.library)}:{material.map_ke.line}"
-        image = file and SourceTexture(FileRange(file), file.name, f"map_Ke {name}", place)
+    image = material.map_ke and _optional_texture(material, "map_Ke", material.map_ke, notes)
     return {"glow": glow, "glow_map": image}
+
+
+def _optional_texture(
+    material: MtlMaterial, key: str, statement: MapStatement, notes: IngestNotes
+) -> SourceTexture | None:
+    """An image whose absence is not noted."""
+    file = notes.folder.find(statement.file, material.library.parent).path
+    if file is None:
+        return None
+    what = f"{key} {statement.file}"
+    place = f"{notes.folder.label(material.library)}:{statement.line}"
+    return SourceTexture(FileRange(file), file.name, what, place, channel=statement.channel)
+
+
+def _matter(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
+    """Metallic and roughness of a material, as the fields of a `SourceMaterial`. A map replaces the
+    number, which many programs write as 0 beside it; one that is missing is matt."""
+    fields: dict[str, Any] = {"metallic": material.pm, "roughness": material.roughness}
+    if used and material.map_pm is not None:
+        fields["metallic_map"] = _optional_texture(material, "map_Pm", material.map_pm, notes)
+        fields["metallic"] = float(fields["metallic_map"] is not None)
+    if used and material.map_pr is not None:
+        fields["roughness_map"] = _optional_texture(material, "map_Pr", material.map_pr, notes)
+        fields["roughness"] = 1.0
+    return fields
 
 
 def _renaming_hint(path: Path, name: str) -> str:

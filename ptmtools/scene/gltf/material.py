@@ -1,17 +1,17 @@
 """Reads materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
 
-The reader keeps the normal map, the emission, and the base colour of the
-metallic-roughness model. The factor of this is linear light, but the tint of the emitted files is
-sRGB, so the factor is converted and the conversion noted; for partial tints the product of tint and
-texel differs from the linear product. The alpha of texels
-applies in the modes MASK and BLEND only (section 3.9.6).
+The reader keeps the normal map, the emission, and base colour, metallic and roughness of the
+metallic-roughness model. The factor of the base colour is linear light, but the tint of the emitted
+files is sRGB, so the factor is converted and the conversion noted; for partial tints the product of
+tint and texel differs from the linear product. The alpha of texels applies in the modes MASK and
+BLEND only (section 3.9.6).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias, TypeVar
 from urllib.parse import unquote
 
@@ -37,7 +37,9 @@ T = TypeVar("T")
 #: A texture, and as `_placement`.
 _Placed: TypeAlias = "tuple[SourceTexture | None, str, NDArray[np.float64], bool]"
 
-_UNLIT = "KHR_materials_unlit"
+_UNLIT, _GLOSSY = "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness"
+#: Loss of opacity of a surface that transmits all light: what it reflects remains.
+_TRANSMITTED = 0.9
 _KTX2 = "image/ktx2"
 _WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
 
@@ -115,9 +117,13 @@ class GltfMaterialReader:
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         see_through = entry.get("alphaMode") in ("MASK", "BLEND")
         alpha = _alpha(entry, a)
-        if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
+        transmission = extensions.get("KHR_materials_transmission", {})
+        if transmission.get("transmissionFactor", 0) > 0:
             self._notes.note("PTM-N215", f"{name}: transmits light, never occludes", place)
             see_through = True
+            blended = alpha["opacity"] < 1 or not (alpha["ignores_alpha"] or use is None)
+            if not (blended or "transmissionTexture" in transmission):
+                alpha["opacity"] = 1 - _TRANSMITTED * _share(transmission["transmissionFactor"])
 
         placed: _Placed = None, "TEXCOORD_0", np.eye(2, 3), False
         if self._texture_of is not None:
@@ -131,9 +137,10 @@ class GltfMaterialReader:
             message = f"{name}: KHR_texture_transform baked into its faces"
             self._notes.note("PTM-N215", message, place)
         normal, normal_coords, normal_matrix = self._normal_texture(entry, name, place, placed)
-        glow = None
+        parts: dict[str, Any] = {}
         if self._texture_of is None:
-            glow = self._optional("PTM-N215", f"{name}: emission", place, self._glow, entry)
+            for what, read in (("emission", self._glow), ("metallic, roughness", self._matter)):
+                parts |= self._optional("PTM-N215", f"{name}: {what}", place, read, entry) or {}
         self._materials.append(
             SourceMaterial(
                 name=name,
@@ -144,7 +151,7 @@ class GltfMaterialReader:
                 normal=normal,
                 unlit=_UNLIT in extensions,
                 **alpha,
-                **(glow or {}),
+                **parts,
             )
         )
         return MaterialUse(
@@ -223,6 +230,28 @@ class GltfMaterialReader:
         red, green, blue = (strength * part for part in factor)
         return {"glow": (red, green, blue), "glow_map": image}
 
+    def _matter(self, entry: dict[str, Any], place: str) -> dict[str, Any]:
+        """Metallic and roughness of a material, as the fields of a `SourceMaterial`."""
+        extensions = entry.get("extensions", {})
+        if _UNLIT in extensions:
+            return {}
+        if (glossy := extensions.get(_GLOSSY)) is not None:
+            fields = {"roughness": 1 - _finite(glossy.get("glossinessFactor", 1.0))}
+            use, maps = glossy.get("specularGlossinessTexture"), {"gloss_map": "m"}
+        else:
+            surface = entry.get("pbrMetallicRoughness", {})
+            names = "metallic", "roughness"
+            fields = {name: _finite(surface.get(f"{name}Factor", 1.0)) for name in names}
+            use = surface.get("metallicRoughnessTexture")
+            maps = {"metallic_map": "b", "roughness_map": "g"}
+        if use is None:
+            return fields
+        with self._notes.optional():
+            image = self._texture(use["index"], place, 1.0)
+        if image is None:
+            return {}
+        return fields | {name: replace(image, channel=channel) for name, channel in maps.items()}
+
     def _texture(self, index: int, place: str, strength: float) -> SourceTexture | None:
         tree = self._document.tree
         texture = tree["textures"][index]
@@ -264,7 +293,7 @@ def _base_color(entry: dict[str, Any]) -> tuple[list[Any], dict[str, Any] | None
     """The factor of a material's base colour, and its texture."""
     color = entry.get("pbrMetallicRoughness", {})
     names = "baseColorFactor", "baseColorTexture"
-    glossy = entry.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    glossy = entry.get("extensions", {}).get(_GLOSSY)
     if glossy is not None:
         color, names = glossy, ("diffuseFactor", "diffuseTexture")
     return color.get(names[0], [1.0, 1.0, 1.0, 1.0]), color.get(names[1])

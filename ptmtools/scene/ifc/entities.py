@@ -209,8 +209,32 @@ def material_of(file: Any, style: Any) -> SourceMaterial:
     if style.has_transparency() and np.isfinite(style.transparency):
         opacity = 1.0 - float(np.clip(style.transparency, 0, 1))
     number = style.instance_id()  # of the style, or of its material
-    name = name_of(file.by_id(number)) if number else ""
-    return SourceMaterial(name or _shade(color), color, opacity)
+    entity = file.by_id(number) if number else None
+    metallic, roughness = _matter(entity)
+    name = name_of(entity) or _shade(color)
+    return SourceMaterial(name, color, opacity, metallic=metallic, roughness=roughness)
+
+
+#: Metallic and roughness by the method of reflectance; 0 and 1 by others.
+_REFLECTANCES = {
+    "METAL": (1.0, 0.3),
+    "MIRROR": (1.0, 0.0),
+    "GLASS": (0.0, 0.0),
+    "PLASTIC": (0.0, 0.4),
+}
+
+
+def _matter(style: Any) -> tuple[float, float]:
+    """Metallic and roughness of a surface style."""
+    metallic, roughness = 0.0, 1.0
+    with suppress(*FAULTS):
+        for part in getattr(style, "Styles", None) or ():
+            if part.is_a("IfcSurfaceStyleRendering"):
+                metallic, roughness = _REFLECTANCES.get(part.ReflectanceMethod, (0.0, 1.0))
+                highlight = part.SpecularHighlight
+                if highlight is not None and highlight.is_a("IfcSpecularRoughness"):
+                    roughness = float(highlight.wrappedValue)
+    return metallic, roughness
 
 
 def note_dropped(file: Any, notes: IngestNotes) -> None:

@@ -28,7 +28,7 @@ from ptmtools.scene.usd.layers import TIME
 from ptmtools.scene.usd.mesh import UsdMesh, array, at_corners
 
 #: Defaults of UsdPreviewSurface (its specification, "Core Nodes").
-_DIFFUSE = (0.18, 0.18, 0.18)
+_DIFFUSE, _ROUGHNESS = (0.18, 0.18, 0.18), 0.5
 _ONES, _ZEROS, _WHITE = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 #: The reader of packages, which older releases have in another module.
 _ARCHIVES = Sdf.ZipFile if hasattr(Sdf, "ZipFile") else Usd.ZipFile
@@ -72,6 +72,20 @@ def _glow(shader: Any) -> Color:
     return red, green, blue
 
 
+def _matter(shader: Any, name: str, place: str, notes: IngestNotes) -> dict[str, Any]:
+    """Metallic and roughness of a shader, as the fields of a `SourceMaterial`; images have no
+    effect."""
+    fields: dict[str, Any] = {}
+    for key, default in (("metallic", 0.0), ("roughness", _ROUGHNESS)):
+        value, source, _ = _resolve(shader.GetInput(key))
+        if source is not None:
+            notes.note("PTM-N215", f"{name}: image of {key} ignored", place)
+        fields[key] = _number(value, default)
+    if _number(_resolve(shader.GetInput("useSpecularWorkflow"))[0], 0.0):
+        fields["metallic"] = 0.0
+    return fields
+
+
 class UsdMaterialReader:
     """Reads each material of the file ``model`` once."""
 
@@ -95,7 +109,10 @@ class UsdMaterialReader:
             return UsdSurface(SourceMaterial(name))
         opacity, varies, from_image = self._opacity(shader, name, place)
         see_through = varies or from_image is not None
-        plain = SourceMaterial(name, opacity=opacity, see_through=see_through, glow=_glow(shader))
+        matter = _matter(shader, name, place, self._notes)
+        plain = SourceMaterial(
+            name, opacity=opacity, see_through=see_through, glow=_glow(shader), **matter
+        )
         value, source, output = _resolve(shader.GetInput("diffuseColor"))
         if source is None:
             self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)

@@ -23,6 +23,7 @@ from tests.scene.features.registry import (
     cut_out,
     feature,
     four,
+    glossy,
     half,
     mirrored,
     seen,
@@ -544,4 +545,12 @@ def _(put: Put) -> str:
 def _(put: Put) -> str:
     doc = GltfModel.wall()
     doc.tree["extensionsUsed"] = ["MSFT_lod"]
+    return glb(put, doc)
+
+
+@feature("glTF", "metallic and roughness", "carried over", glossy)
+def _(put: Put) -> str:
+    doc = GltfModel()
+    doc.tree["materials"] = [{"pbrMetallicRoughness": {"roughnessFactor": 0.25}}]
+    doc.place(doc.quad(material=0))
     return glb(put, doc)

@@ -6,7 +6,7 @@ from typing import Any
 
 from ptmtools.scene import Scene
 from tests.scene.conftest import Put
-from tests.scene.features.registry import feature, half
+from tests.scene.features.registry import feature, glossy, half
 
 
 def written(put: Put, made: Any, name: str = "a.ifc") -> str:
@@ -75,4 +75,14 @@ def _(put: Put) -> str:
     made = building()
     made.box("IfcWall", "W", (0, 0, 0), (5, 1, 3))
     made.box("IfcSpace", "S", (0, 1, 0), (5, 5, 3))
+    return written(put, made)
+
+
+@feature("IFC", "metallic and roughness", "carried over", glossy)
+def _(put: Put) -> str:
+    made = building()
+    highlight = made.file.create_entity("IfcSpecularRoughness", 0.25)
+    rendering = {"ReflectanceMethod": "METAL", "SpecularHighlight": highlight}
+    style = made.style("Steel", (1.0, 1, 1), **rendering)
+    made.box("IfcWall", "W", (0, 0, 0), (5, 1, 3), style=style)
     return written(put, made)

@@ -13,6 +13,7 @@ from tests.scene.features.registry import (
     cut_out,
     feature,
     four,
+    glossy,
     half,
     shown,
     the_quad,
@@ -144,3 +145,8 @@ def _(put: Put) -> str:
 @feature("OBJ", "polygons", "carried over", the_quad)
 def _(put: Put) -> str:
     return obj(put)
+
+
+@feature("OBJ", "metallic and roughness", "carried over", glossy)
+def _(put: Put) -> str:
+    return obj(put, "Pm 1\nPr 0.25")

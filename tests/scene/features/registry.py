@@ -49,6 +49,11 @@ FEATURES: list[Feature] = []
 FORMS = ("obj", "gltf", "ply", "usd", "ifc")
 
 
+def glossy(scene: Scene) -> None:
+    (material,) = scene.materials
+    assert (material.metallic, material.roughness) == (1, 0.25)
+
+
 def all_features() -> list[Feature]:
     """Those of all formats."""
     for form in FORMS:

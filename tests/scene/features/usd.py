@@ -15,6 +15,7 @@ from tests.scene.features.registry import (
     cut_out,
     feature,
     four,
+    glossy,
     half,
     mirrored,
     seen,
@@ -189,4 +190,12 @@ def _(put: Put) -> str:
     curves = UsdGeom.BasisCurves.Define(on, "/World/line")
     curves.CreatePointsAttr([(0, 0, 0), (1, 0, 0)])
     curves.CreateCurveVertexCountsAttr([2])
+    return written(put, on)
+
+
+@feature("USD", "metallic and roughness", "carried over", glossy, "PTM-N215")
+def _(put: Put) -> str:
+    on = made().stage()
+    metal = made().material(on, "/World/m", metallic=1.0, roughness=0.25)
+    made().bind(made().mesh(on), metal)
     return written(put, on)

@@ -139,11 +139,18 @@ class Ifc:
         return opening
 
     def style(
-        self, name: str | None, color: Sequence[float], transparency: float | None = None
+        self,
+        name: str | None,
+        color: Sequence[float],
+        transparency: float | None = None,
+        **rendering: Any,
     ) -> Any:
         tint = self.file.create_entity("IfcColourRgb", None, *color)
         shading = self.file.create_entity(
-            "IfcSurfaceStyleRendering", tint, transparency, ReflectanceMethod="NOTDEFINED"
+            "IfcSurfaceStyleRendering",
+            tint,
+            transparency,
+            **{"ReflectanceMethod": "NOTDEFINED", **rendering},
         )
         return self.file.create_entity("IfcSurfaceStyle", name, "BOTH", [shading])
 

@@ -139,6 +139,32 @@ def test_light_fixtures_glow(tmp_path: Path, schema: str) -> None:
     assert glow == {"wall": (0,) * 3, "tap": (0,) * 3, "panel": (ifc_products.GLOW,) * 3}
 
 
+@pytest.mark.parametrize(
+    ("method", "highlight", "matter"),
+    [
+        ("NOTDEFINED", None, (0, 1)),
+        ("MATT", None, (0, 1)),
+        ("PHONG", ("IfcSpecularExponent", 128.0), (0, 1)),
+        ("METAL", None, (1, 0.3)),
+        ("MIRROR", None, (1, 0)),
+        ("GLASS", None, (0, 0)),
+        ("PLASTIC", None, (0, 0.4)),
+        ("METAL", ("IfcSpecularRoughness", 0.75), (1, 0.75)),
+        ("PHONG", ("IfcSpecularRoughness", 0.5), (0, 0.5)),
+    ],
+)
+def test_reflectance(
+    tmp_path: Path, method: str, highlight: tuple[str, float] | None, matter: tuple[float, float]
+) -> None:
+    made = Ifc()
+    specular = highlight and made.file.create_entity(*highlight)
+    style = made.style("Paint", (1, 1, 1), ReflectanceMethod=method, SpecularHighlight=specular)
+    made.box("IfcWall", "wall", (0, 0, 0), (1, 1, 1), style=style)
+    source, _ = read(made.write(tmp_path / "matter.ifc"))
+    material = source.materials[source.triangle_material[0]]
+    assert (material.metallic, material.roughness) == matter
+
+
 def test_a_part_is_what_it_is_a_part_of(tmp_path: Path) -> None:
     made = Ifc()
     for i, whole in enumerate(("IfcWall", "IfcColumn", "IfcDoor")):

@@ -46,6 +46,34 @@ def test_emission_has_a_colour(read: Any) -> None:
     assert material.glow == (0.5, 0.25, 0)
 
 
+@pytest.mark.parametrize(
+    ("inputs", "matter"),
+    [
+        ({}, (0, 0.5)),
+        ({"metallic": 1.0, "roughness": 0.25}, (1, 0.25)),
+        ({"metallic": 1.0, "useSpecularWorkflow": 1}, (0, 0.5)),
+        ({"metallic": float("nan"), "roughness": 7.0}, (0, 7)),  # clipped later
+    ],
+)
+def test_metallic_and_roughness(
+    read: Any, inputs: dict[str, float], matter: tuple[float, float]
+) -> None:
+    on = made.stage()
+    made.bind(made.mesh(on), made.material(on, "/World/paint", **inputs))
+    (material,) = read(on).source.materials
+    assert (material.metallic, material.roughness) == matter
+
+
+def test_an_image_of_roughness_is_noted(read: Any) -> None:
+    on = made.stage()
+    image = made.shader(on, "/World/paint/rough", "UsdUVTexture", file="rough.png")
+    output = image.CreateOutput("r", Sdf.ValueTypeNames.Float)
+    made.bind(made.mesh(on), made.material(on, "/World/paint", roughness=output))
+    result = read(on)
+    assert result.source.materials[0].roughness == 0.5
+    assert "image of roughness ignored" in result.says("PTM-N215")
+
+
 @pytest.mark.parametrize(("opacity", "threshold", "shown"), [(0.3, 0.5, 0), (0.7, 0.5, 1)])
 def test_cut_out_is_all_or_nothing(read: Any, opacity: float, threshold: float, shown: int) -> None:
     on = made.stage()

@@ -80,6 +80,9 @@ def shader(on: Usd.Stage, path: str, kind: str, **inputs: Any) -> UsdShade.Shade
     types = {
         "diffuseColor": "Color3f",
         "emissiveColor": "Color3f",
+        "metallic": "Float",
+        "roughness": "Float",
+        "useSpecularWorkflow": "Int",
         "opacity": "Float",
         "opacityThreshold": "Float",
         "file": "Asset",
