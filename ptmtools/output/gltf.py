@@ -220,7 +220,10 @@ class MaterialWriter:
         if mesh is not None:
             extras["mesh"] = mesh
         row: dict[str, Any] = {"name": material.name}
-        row["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
+        surface["metallicFactor"] = material.metallic or 0
+        if material.roughness != 1:
+            surface["roughnessFactor"] = material.roughness
+        row["pbrMetallicRoughness"] = surface
         if cutoff is not None:
             row |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
         elif blends:

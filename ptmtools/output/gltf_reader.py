@@ -45,6 +45,7 @@ class ReadMaterial:
     normal, normal_map: the same for the normal map of the object or of the material; coords,
         scale, normal_wrap: of that of the material, the number of its coordinates, the factor of
         its normals and the numbers of its sampler; coords is None of that of the object.
+    metallic, roughness: in [0, 1].
     """
 
     factor: tuple[float, ...]
@@ -64,6 +65,8 @@ class ReadMaterial:
     coords: int | None = None
     scale: float = 1.0
     normal_wrap: tuple[int, int] = (WRAPS["repeat"], WRAPS["repeat"])
+    metallic: float = 0.0
+    roughness: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -362,6 +365,8 @@ class _GlbReader:
             coords=coords,
             scale=extras.get("normalScale", 1),
             normal_wrap=normal_wrap,
+            metallic=surface["metallicFactor"],
+            roughness=surface.get("roughnessFactor", 1),
         )
 
     def _image(self, use: dict[str, int] | None, wrap: tuple[int, int], place: str) -> str | None:

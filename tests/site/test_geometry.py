@@ -14,7 +14,7 @@ from ptmtools.output.gltf import pack, unpack
 from ptmtools.site.conversion import lean_glb
 from tests.e2e.conftest import make_museum
 
-UNREAD = ("name", "metallicFactor", "ptm", "baseColorTexture")
+UNREAD = ("name", "metallicFactor", "roughnessFactor", "ptm", "baseColorTexture")
 
 
 @pytest.fixture(scope="module")

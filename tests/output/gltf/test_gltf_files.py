@@ -20,6 +20,7 @@ from PIL import Image
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.output import EmitOptions, validate_database
 from ptmtools.output.gltf import linear, pack, unpack
+from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.gltf_shapes import PlainBuffer
 from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import Material
@@ -155,6 +156,27 @@ def test_alpha_of_a_texture_blends_where_it_is_used(
         for material in tree["materials"]
     }
     assert modes == {"00": "OPAQUE", "01": "OPAQUE", "10": "OPAQUE", "11": "BLEND"}
+
+
+def test_metallic_and_roughness_are_written(
+    artifacts: Any, emit_gltf: EmitGltf, tmp_path: Path
+) -> None:
+    """Of materials that are alike in all else; a roughness of 1 is the default of the format."""
+    matter = ((0.0, 1.0), (1.0, 0.25), (0.5, 1.0), (0.0, 0.0))
+    looks = tuple(Material("steel", metallic=m, roughness=r) for m, r in matter)
+    quad = np.arange(len(artifacts.scene.triangles)) // 2
+    index = (quad % len(looks)).astype(np.int32)
+    scene = replace(artifacts.scene, materials=looks, triangle_material=index)
+    www = emit_gltf(tmp_path / "www", scene=scene)
+    surfaces = [m["pbrMetallicRoughness"] for tree in documents(www) for m in tree["materials"]]
+    written = {(s["metallicFactor"], s.get("roughnessFactor")) for s in surfaces}
+    assert written == {(0, None), (1, 0.25), (0.5, None), (0, 0)}
+    read = {
+        (primitive.material.metallic, primitive.material.roughness)
+        for glb in (www / "gltf").glob("*.glb")
+        for primitive in read_glb(glb.read_bytes()).primitives
+    }
+    assert read == set(matter)
 
 
 def test_sides_and_objects(artifacts: Any, gltf_finished: Path) -> None:
