@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, sum_by_group
 from ptmtools.light.lamps import Lamps, direct_light, lamps_near, lamps_of
 from ptmtools.light.looks import planes
 from ptmtools.light.occlusion import Occluders, normals, points_on, spread_over, turns
@@ -55,8 +55,9 @@ _SAMPLES, _RAYS = 4096, 32
 #: Points with less than this share of the usual light are dark; ceilings over them glow if this
 #: share of the surfaces is dark, and so much as a share of the usual light.
 _DARK, _MANY, _LIFT = 0.02, 0.01, 0.5
-#: Points of a plane, and rays from each, that tell which side is brighter.
-_SIDE_POINTS, _SIDE_RAYS = 8, 16
+#: Points of a face, and rays from each, that tell which side is brighter; sides are alike up to
+#: this ratio of their light.
+_SIDE_POINTS, _SIDE_RAYS, _ALIKE = 4, 8, 2.0
 #: Share of rays to what is nearer than half a texel, or to the inside of walls, from which on a
 #: point is covered.
 _COVERED = 0.25
@@ -88,26 +89,22 @@ class BuildingLight:
         return GatheredLight(self, normal, lamps, samples, near)
 
     def brighter_sides(self, corner: Floats) -> Floats:
-        """(n,) 1 where the front of (n, 3, 3) faces is lit more, -1 where the back is; faces of one
-        plane that edges connect have the same side."""
+        """(n,) 1 where the front of (n, 3, 3) faces is lit more, -1 where the back is. Faces whose
+        sides are alike follow those of the same plane that edges connect with them."""
         normal, area = normals(corner), areas(corner)
         wanted = area > 0
-        if not wanted.any():
-            return np.ones(len(corner))
         plane = planes(corner, normal, wanted)
         along = np.where(np.einsum("tx,tx->t", normal, normal[plane]) < 0, -1.0, 1.0)
-        chosen = np.unique(plane[wanted])
-        group = np.where(wanted, plane, -1)
-        face = spread_over(area, group, chosen, _SIDE_POINTS).ravel()
-        number = np.tile(np.arange(_SIDE_POINTS), len(chosen))
-        point, turn, sums = points_on(corner[face], number), turns(len(face)), []
+        face = np.repeat(np.arange(len(corner)), _SIDE_POINTS)
+        point = points_on(corner[face], np.tile(np.arange(_SIDE_POINTS), len(corner)))
+        turn, sums = turns(len(face)), []
         for sign in (1.0, -1.0):
-            way = sign * along[face, None] * normal[face]
-            light = self._light(point, way, turn, _SIDE_RAYS)
-            sums.append(luminance(light).reshape(len(chosen), -1).sum(axis=1))
-        back = np.zeros(len(corner), np.bool_)
-        back[chosen] = sums[1] > sums[0]
-        return np.where(back[plane], -along, along)
+            light = self._light(point, sign * normal[face], turn, _SIDE_RAYS)
+            sums.append(luminance(light).reshape(-1, _SIDE_POINTS).mean(axis=1))
+        front, back = sums
+        difference = sum_by_group(plane, along * area * (front - back), len(corner))[plane]
+        alike = np.maximum(front, back) < _ALIKE * np.minimum(front, back)
+        return np.where(np.where(alike, along * difference, front - back) < 0, -1.0, 1.0)
 
     def _light(self, point: Floats, normal: Floats, turn: Floats, rays: int) -> Floats:
         return self.field.gather(point, normal, turn, rays).light + direct_light(
@@ -231,12 +228,9 @@ class BuildingBaking:
         self, lamps: Lamps, coarse: Lamps, daylight: Daylight, emission: Floats | None
     ) -> BuildingLight:
         patches, around = self._patches, self._around
-        face, side, number = patches.faces()
-        normal = normals(patches.corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
         spread, direct = turns(patches.count), np.zeros((patches.count, 3))
         for k in range(_POINTS if len(coarse) else 0):
-            across, along = (spread + k / _POINTS) % 1, (3 * spread + k / 2) % 1
-            point = patches.points(face, number, across, along)
+            point, normal = self._patch_points(k / _POINTS)
             direct += direct_light(around, coarse, point, normal, spread, _SHADOWS) / _POINTS
         glow = 0.0 if emission is None else emission
         field = transport(around, patches, self._albedo, direct, daylight, glow)
@@ -252,24 +246,26 @@ class BuildingBaking:
             sky=bool((sky.gather(point, normal, turn, _RAYS).light > 0).any()),
         )
 
+    def _patch_points(self, shift: float = 0.0) -> tuple[Floats, Floats]:
+        """(patches, 3) a point of each patch, others for another ``shift``, and its normal."""
+        face, side, number = self._patches.faces()
+        spread = turns(len(face))
+        across, along = (spread + shift) % 1, (3 * spread + shift) % 1
+        normal = normals(self._corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
+        return self._patches.points(face, number, across, along), normal
+
     def _ceilings(self, radiance: Floats, dark: BuildingLight | None = None) -> Floats | None:
         """(patches, 3) what ceilings send that glow with (3,) ``radiance``; only those that are
         dark in a light, if there is one. None without any."""
-        face, side, _ = self._patches.faces()
-        sign = np.where(side == 0, 1.0, -1.0)
-        normal = normals(self._corner) @ np.array([0.0, 1.0, 0.0])
-        down = np.flatnonzero(sign * normal[face] < -_DOWN)
-        middle = self._corner.mean(axis=1)
-        under = np.unique(face[down])
-        point = middle[under] - [0, self._around.lift, 0]
-        height = np.zeros(len(middle))
+        point, normal = self._patch_points()
+        down = np.flatnonzero(normal[:, 1] < -_DOWN)
+        under = point[down] + self._around.lift * normal[down]
         low, high = self._scene.points[:, 1].min(), self._scene.points[:, 1].max()
-        height[under] = point[:, 1] - self._around.upright(point, high - low + 1, -1.0)
+        height = under[:, 1] - self._around.upright(under, high - low + 1, -1.0)
         enough = min(_OVER, _OF_HIGHEST * float(height.max(initial=0.0)))
-        chosen = down[(height[face[down]] >= enough) & (height[face[down]] > 0)]
+        chosen = down[(height >= enough) & (height > 0)]
         if dark is not None and len(chosen):
-            way = np.tile([0.0, -1.0, 0.0], (len(chosen), 1))
-            light = dark._light(middle[face[chosen]], way, turns(len(chosen)), _RAYS)
+            light = dark._light(point[chosen], normal[chosen], turns(len(chosen)), _RAYS)
             chosen = chosen[luminance(light) < _DARK * dark.usual]
         if not len(chosen):
             return None

@@ -47,6 +47,10 @@ _GRAIN, _DIM, _MORE, _AGAIN = 0.1, 0.1, 3, 0.381966
 _LEAST = 0.01
 #: The share of a cell's light that its white is not less than.
 _WHITE = 0.995
+#: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
+#: and the share of the surfaces that is no brighter than the other number, so that white walls keep
+#: their texture.
+_KEY, _HIGH, _MOST_OF_WHITE = 0.3, 0.9, 0.75
 #: The side of a lightmap is a multiple of this, so that four of its levels halve exactly,
 _MULTIPLE = 16
 #: and at most this, texels.
@@ -71,8 +75,8 @@ class CellLight:
     ----------
     white: the light of which texels and `vertex` are shares.
     texels: (side, side, 3) uint8 codes; None without a lightmap.
-    radiance: the mean of the logarithms of the luminance that its surfaces reflect, and their area,
-        m²; 0 without lit surfaces.
+    exposure: the factor with which it shows by itself, see `_exposure`, and the area of its lit
+        surfaces, m².
     crowded: whether neighbours in the lightmap run into each other.
     density: texels to the metre, of those that were asked for; 1 without a lightmap.
     """
@@ -83,7 +87,7 @@ class CellLight:
     vertex: NDArray[np.uint8]
     white: float
     texels: NDArray[np.uint8] | None
-    radiance: tuple[float, float]
+    exposure: tuple[float, float]
     crowded: bool
     density: float = 1.0
 
@@ -142,7 +146,7 @@ class LightBaking:
             np.where(dense[:, None, None], shares, np.uint8(255)),
             white,
             None if texels is None else light_codes(texels, white),
-            _log_mean(radiance, weight),
+            _exposure(radiance, weight),
             *rest,
         )
 
@@ -229,13 +233,17 @@ def _brightened(painted: PaintedLight) -> Look:
     return look
 
 
-def _log_mean(radiance: Floats, weight: Floats) -> tuple[float, float]:
-    """The mean of the logarithms of some radiance that is not 0, and its weight."""
-    weight = weight * (radiance > 0)
-    total = float(weight.sum())
-    if not total > 0:
+def _exposure(radiance: Floats, weight: Floats) -> tuple[float, float]:
+    """The logarithm of the factor with which some radiance of this weight shows, and the weight of
+    what is not 0."""
+    shows = np.flatnonzero((radiance > 0) & (weight > 0))
+    if not len(shows):
         return 0.0, 0.0
-    return float(weight @ np.log(np.where(radiance > 0, radiance, 1))) / total, total
+    order = shows[np.argsort(radiance[shows], kind="stable")]
+    total = np.cumsum(weight[order])
+    mean = float(weight[order] @ np.log(radiance[order])) / float(total[-1])
+    bright = radiance[order[np.searchsorted(total, _HIGH * total[-1])]]
+    return min(math.log(_KEY) - mean, math.log(_MOST_OF_WHITE / bright)), float(total[-1])
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:

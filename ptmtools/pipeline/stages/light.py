@@ -46,9 +46,8 @@ if TYPE_CHECKING:
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.sources import PtmSource
 
-#: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
-#: cells differ from the building by at most two stops.
-_KEY, _MOST_STOPS = 0.3, math.log(4)
+#: Natural logarithm of the factor by which exposures of cells differ from the building's at most.
+_MOST_STOPS = math.log(4)
 #: Lightmaps with less than this share of the texels to the metre that were asked for are reported.
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
@@ -210,18 +209,17 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
     of cells: of what is seen from a cell, half is in its neighbours."""
     import numpy as np
 
-    mean, area = np.array([light.radiance for light in cell_lights]).reshape(-1, 2).T
+    wanted, area = np.array([light.exposure for light in cell_lights]).reshape(-1, 2).T
     standing = area * (cells.standing if (area * cells.standing).any() else 1)
     if not standing.any():
         return 1.0, np.ones(len(area))
-    usual = float(standing @ mean / standing.sum())
-    total, weight = mean * area, area.copy()
+    usual = float(standing @ wanted / standing.sum())
+    total, weight = wanted * area, area.copy()
     for cell, near in enumerate(cells.adjacent()):
-        total[cell] += (mean[near] * area[near]).sum() / 2
+        total[cell] += (wanted[near] * area[near]).sum() / 2
         weight[cell] += area[near].sum() / 2
     own = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
-    stops = np.clip(usual - own, -_MOST_STOPS, _MOST_STOPS)
-    return _KEY / math.exp(usual), np.exp(stops)
+    return math.exp(usual), np.exp(np.clip(own - usual, -_MOST_STOPS, _MOST_STOPS))
 
 
 def _notes(lights: list[CellLight]) -> Iterator[str]:
