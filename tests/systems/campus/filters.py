@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Ints, Singles
-from ptmtools.light.lightmap import AGREE
+from ptmtools_systems.campus.lightmaps import AGREE
 
 _ENOUGH = 0.5
 _KERNEL = ((-1, 0.25), (0, 0.5), (1, 0.25))

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.light.looks import RayLight, open_sides, planes
-from ptmtools.light.occlusion import Occluders, hemisphere, light, normals, turns
+from ptmtools.light.looks import planes
+from ptmtools.light.occlusion import Occluders, hemisphere, normals, turns
+from ptmtools_systems.campus.obscurance import RayLight, light, open_sides
 from tests.light.shapes import prism, quad
 
 UP = np.array([[0.0, 1, 0]])
@@ -81,7 +82,7 @@ def test_the_lighter_side_counts() -> None:
     assert open_sides(where, mixed, np.ones(2, bool), 20.0).tolist() == [1, -1]
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
     for side, least, most in ((-1.0, 0.9, 1.0), (1.0, 0.0, 0.2)):
-        actual = RayLight(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
+        actual = RayLight(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0, 0]
         assert least <= actual <= most
 
 
@@ -138,8 +139,8 @@ def test_a_coarse_face_beneath_the_surface_has_its_light() -> None:
     assert (normals(sheet)[:, 1] > 0).all()
     where = around(FLOOR)
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
-    assert RayLight(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
-    assert RayLight(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
+    assert RayLight(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0, 0] < 0.2
+    assert RayLight(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0, 0] == 1.0
 
 
 def test_sight_ends_at_what_is_before_it() -> None:
