@@ -51,7 +51,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     modelled, one with octrees, and a walk of 20 s."""
     folder = tmp_path_factory.mktemp("statues")
     model = str(write_rooms(folder / "model", 4))
-    build = ["-q", "build-scene", model, "-j", "1", "--samples", "4", "-o"]
+    build = ["-q", "build-scene", model, "-j", "1", "--samples", "4"]
+    build += ["--light", "none", "-o"]
     assert main([*build, str(folder / "plain.db")]) == 0
     apo = ["--apo", "statue_*", "--apo-faces", "600", "--apo-depth", "8"]
     assert main([*build, str(folder / "light.db"), *apo]) == 0
