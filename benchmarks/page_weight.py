@@ -23,6 +23,7 @@ FEATURES = {
     "comparison (`?compare`)": ("compare.js",),
     "a language besides English": ("words-de.js",),
     "tour": ("tour.js",),
+    "light": ("light.js",),
     "statues as octrees": ("statues.js",),
     "statues as normal maps, normal maps of materials": ("reliefs.js",),
     "interlaced images (`?form=gpuii`)": ("sets.js",),

@@ -30,7 +30,7 @@ PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
 _LOOK = ("alphaMode", "alphaCutoff", "doubleSided")
 _SURFACE = ("baseColorFactor",)
 _NORMAL = ("normal", "normalCoords", "normalScale", "normalWrapS", "normalWrapT")
-_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", *_NORMAL)
+_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", "white", *_NORMAL)
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,8 @@ PAGE = Path(__file__).parent / "page"
 HTML, JAVASCRIPT = "text/html; charset=utf-8", "text/javascript; charset=utf-8"
 #: Scripts that few visits need.
 LATER = (
-    *("later.js", "compare.js", "reliefs.js", "tour.js", "embedded.js", "register.js"),
-    *("gamepad.js", "xr.js"),
+    *("later.js", "compare.js", "light.js", "reliefs.js", "tour.js", "embedded.js"),
+    *("register.js", "gamepad.js", "xr.js"),
     *(f"words-{language}.js" for language in LANGUAGES if language != "en"),
 )
 #: The media type of each file.

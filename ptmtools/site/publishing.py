@@ -229,6 +229,7 @@ def weight_of(site: Site) -> Weight:
         if row.get("standing", True)
     }
     used = {kind.script.name for kind in representations_in(index)}
+    used |= {"light.js"} & {f"{name}.js" for name in index}
     used |= {"reliefs.js" for row in index["textures"] if row.keys() & {"relief", "normals"}}
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     unused = {*LATER, *attached_scripts()} - used

@@ -14,7 +14,8 @@ from ptmtools.output.gltf import pack, unpack
 from ptmtools.site.conversion import lean_glb
 from tests.e2e.conftest import make_museum
 
-UNREAD = ("name", "metallicFactor", "roughnessFactor", "ptm", "baseColorTexture")
+UNREAD = ("name", "metallicFactor", "roughnessFactor", "ptm")
+UNREAD += ("baseColorTexture", "occlusionTexture")
 
 
 @pytest.fixture(scope="module")

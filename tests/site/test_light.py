@@ -1,14 +1,18 @@
-"""Lightmaps on the page: pictures as by `ptm render`, requests, damaged files, a lost context."""
+"""Light on the page: pixels by the formula and as by `ptm render`, exposure, requests, hostile and
+damaged files, a lost context."""
 
 from __future__ import annotations
 
 import io
-from dataclasses import replace
+import json
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from browser import Visitor, hurried
+from browser import Visitor, hurried, new_page, visiting_in
+from engines import PACKAGES, Engine, visiting_by
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -20,6 +24,7 @@ from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import SiteEntry
 from ptmtools.site.pictures import pictures
 from tests.site.conftest import PLAIN, Visiting
+from tests.site.strips import EXPOSURE, EYES, lit_site, view_of
 from tests.systems.apo.statues import write_rooms
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
@@ -29,13 +34,19 @@ WIDTH, HEIGHT = 320, 240
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with light, and the same one without; the second statue has no texture."""
+    """A database with light at half of its exposure, and the same one without light; the second
+    statue has no texture."""
     folder = tmp_path_factory.mktemp("light")
     model = write_rooms(folder / "model", 4)
     options = ["--format", "gltf", "--no-fallback", "-j", "1", "--backend", "embree"]
     for name, more in (("lit", ["--light", "bake", "--light-samples", "16"]), ("plain", [])):
         command = ["-q", "build-scene", str(model), "-o", str(folder / name), *options, *more]
         assert main(command) == 0
+    hints = folder / "lit/www/hints.json"
+    index = json.loads(hints.read_text())
+    for cell in index["cells"]:
+        cell["exposure"] = 0.5
+    hints.write_text(json.dumps(index))
     return folder
 
 
@@ -44,28 +55,34 @@ def site(folder: Path) -> Site:
     return site_of(folder / "lit", PLAIN)
 
 
+@pytest.fixture(scope="module")
+def plain(folder: Path) -> Site:
+    return site_of(folder / "plain", PLAIN)
+
+
 def psnr(one: Floats, other: Floats) -> float:
     return float(10 * np.log10(255**2 / max(((one - other) ** 2).mean(), 1e-9)))
 
 
 def lightmaps(site: Site) -> set[str]:
-    return {row["file"] for row in site.index["textures"] if "light" in row}
+    """Their images."""
+    rows = (row for row in site.index["textures"] if "light" in row)
+    return {preview["file"] for row in rows for preview in row["previews"]}
 
 
 def test_light_at_vertices_is_baked_light(visit: Visiting, site: Site, folder: Path) -> None:
-    """The second statue, plain and with light in its colours, keeps as much of them as plain
-    surfaces with a lightmap."""
+    """Of the second statue, which is plain and has light in its colours."""
     served, statue = read_served(folder / "lit"), (slice(80, 160), slice(120, 200))
     angle = float(np.degrees(served.index["viewpoints"][0]["fieldOfView"]))
     eye = (2.7, 0.45, -0.3, 180.0)
     view = ViewOptions(eye=eye, field_of_view=angle, width=WIDTH, height=HEIGHT)
     expected = draw_view(served, view).astype(float)[statue]
-    unlit = replace(served, surfaces=replace(served.surfaces, lightmap=None))
-    assert expected.mean() > draw_view(unlit, view)[statue].mean() + 5
+    unlit = draw_view(read_served(folder / "plain"), view).astype(float)[statue]
     query = "#" + ",".join(map(str, eye))
     with visit(site, query=query, width=WIDTH, height=HEIGHT) as visitor:
         visitor.complete()
-        assert psnr(visitor.picture().astype(float)[statue], expected) > 34
+        shown = visitor.picture().astype(float)[statue]
+    assert psnr(shown, expected) > max(34, psnr(shown, unlit) + 8)
 
 
 @pytest.mark.parametrize("viewpoint", [0, 1])
@@ -83,8 +100,7 @@ def test_the_page_shows_what_render_draws(
         assert visitor.messages == []
         asked = {v.path.rpartition("/")[2] for v in visitor.visits}
         assert asked & lightmaps(site)
-    assert psnr(shown, expected) > 34
-    assert psnr(shown, expected) > psnr(shown, unlit) + 8
+    assert psnr(shown, expected) > max(34, psnr(shown, unlit) + 8)
 
 
 def test_a_lightmap_is_in_view_with_its_cell(visit: Visiting, site: Site) -> None:
@@ -148,3 +164,112 @@ def test_posters_are_lit(folder: Path) -> None:
     )
     expected = draw_view(read_served(folder / "lit"), ViewOptions(width=640, height=360))
     assert psnr(lit, expected.astype(float)) > psnr(plain, expected.astype(float)) + 5
+
+
+def stand(visitor: Visitor, eye: Sequence[float]) -> None:
+    """Places the eye, which nothing moves then."""
+    visitor.until("s.pose")
+    place = "(eye) => { ptm.walker.step = () => {}; ptm.goTo({ eye, yaw: 0, pitch: 0 }) }"
+    visitor.page.evaluate(place, list(eye))
+
+
+def check_strips(visitor: Visitor, site: Site, tone: str, size: tuple[int, int]) -> None:
+    """From a cell with little exposure, and from one with much."""
+    angle = site.index["viewpoints"][0]["fieldOfView"]
+    for eye, exposure in zip(EYES, EXPOSURE, strict=True):
+        stand(visitor, eye)
+        visitor.complete()
+        exposed = exposure if tone == "neutral" else 1.0
+        expected, parts = view_of(eye, angle, size, exposed, tone)
+        apart = np.abs(visitor.picture() - expected).max(axis=2)
+        assert [name for name, part in parts.items() if apart[part].max() > 3] == []
+    assert visitor.messages == []
+
+
+@pytest.mark.parametrize("tone", ["neutral", "plain"])
+def test_each_pixel_follows_the_formula(revisit: Visiting, plain: Site, tone: str) -> None:
+    """Of a lightmap, of light at vertices, of an unlit surface, under a normal map, and around."""
+    site = lit_site(plain, lambda index: index["light"].update(tone=tone))
+    with revisit(site, width=WIDTH, height=HEIGHT) as visitor:
+        check_strips(visitor, site, tone, (WIDTH, HEIGHT))
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_other_engines_draw_the_same(
+    engines: Callable[[str], Engine], plain: Site, name: str
+) -> None:
+    site, size = lit_site(plain), (512, 384)
+    with visiting_by(engines(name), site.entries, width=size[0], height=size[1]) as visitor:
+        check_strips(visitor, site, "neutral", size)
+
+
+#: Exposures of a walk through the door, at these cells, places along x and times, s.
+EXPOSURES = """
+([fades, steps]) => {
+  const { picture, picture: { renderer: { light } }, client, index } = ptm.walk;
+  return steps.map(([cell, x, now]) => {
+    light.adapt({ cell, client, index, memory: { fades }, picture }, [x, 1.5, 0], now);
+    return light.exposure;
+  });
+}
+"""
+
+
+def test_exposure_eases(revisit: Visiting, plain: Site) -> None:
+    """Within a second; at once after a jump, or if nothing shall move; outside of all cells it
+    stays."""
+    less, more = EXPOSURE
+    steps = [(1, 3.0, 0.5), (0, 0.0, 1.0), (1, 0.2, 1.1), (1, 0.3, 1.3), (1, 0.4, 2.2)]
+    steps += [(-1, 0.5, 3.0), (0, -2.0, 3.1)]
+    with revisit(lit_site(plain), width=64, height=48) as visitor:
+        visitor.complete()
+        eased, sudden = (visitor.page.evaluate(EXPOSURES, [f, steps]) for f in (True, False))
+    assert sudden == [more, less, more, more, more, more, less]
+    assert less < eased[2] < eased[3] < more
+    assert eased[:2] + eased[4:] == sudden[:2] + sudden[4:]
+
+
+def change(**light: Any) -> Callable[[dict[str, Any]], None]:
+    """Other members of the light of an index."""
+    return lambda index: index["light"].update(light)
+
+
+HOSTILE: dict[str, tuple[Callable[[dict[str, Any]], None], dict[str, Any]]] = {
+    "a light that brightens by codes": (change(stops=-1), {}),
+    "a range that is no number": (change(stops="many"), {}),
+    "an infinite sky": (change(sky=[0, 1e999, 0]), {}),
+    "a sky that is no colour": (change(sky=3), {}),
+    "a dark cell": (lambda index: index["cells"][1].update(exposure=-1), {}),
+    "a negative white": (change(), {"white": -1}),
+    "a lightmap without a white": (change(), {"white": None}),
+}
+#: Codes of the message and of errors of a walk.
+CODES = """
+[document.querySelector("#error-code").textContent,
+  ...(window.ptm?.errors ?? []).map(({ code }) => code)].filter(Boolean)
+"""
+
+
+@pytest.fixture(scope="module")
+def hasty(chromium: Any) -> Iterator[Any]:
+    page = new_page(chromium, 160, 120, hurried)
+    yield page
+    page.context.close()
+
+
+@pytest.mark.parametrize("fault", HOSTILE)
+def test_hostile_light(hasty: Any, plain: Site, fault: str) -> None:
+    with visiting_in(hasty, lit_site(plain, *HOSTILE[fault]).entries) as visitor:
+        visitor.until(f"({CODES.strip()}).length > 0")
+        assert set(visitor.page.evaluate(CODES)) == {"PTM-V105"}
+
+
+def test_without_its_script(revisit: Visiting, plain: Site) -> None:
+    """The walk goes on, unlit."""
+    entries = lit_site(plain).entries
+    entries = {name: e for name, e in entries.items() if not name.endswith("/light.js")}
+    with revisit(Site(entries, {}), width=160, height=120) as visitor:
+        visitor.page.wait_for_selector("#notices p")
+        stand(visitor, EYES[0])
+        visitor.complete()
+        assert visitor.picture().std() > 5

@@ -45,14 +45,14 @@ CONSTANTS = HERE / "policy" / "constants.js"
 PAGE, SYSTEMS_PAGE = "ptmtools/site/page", "ptmtools_systems/page"
 #: Scripts that the page loads when it needs them.
 LATER = (
-    *("later.js", "compare.js", "reliefs.js", "tour.js", "embedded.js", "register.js"),
-    *("gamepad.js", "xr.js"),
+    *("later.js", "compare.js", "light.js", "reliefs.js", "tour.js", "embedded.js"),
+    *("register.js", "gamepad.js", "xr.js"),
 )
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _WORD = re.compile(r"\[\[(\w+)\]\]")
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.
-_SHADER = re.compile(r"`[^`]*\b(?:uniform|gl_Position)\b[^`]*`")
+_SHADER = re.compile(r"`[^`]*\b(?:uniform|gl_Position|vec3)\b[^`]*`")
 _SHADER_REMARK = re.compile(r"\s*//[^\n]*")
 
 

@@ -14,7 +14,9 @@ export class Comparison {
     this.memory = new TextureMemory(gl, rows, (t, levels) => stream.decode(t, levels));
     this.memory.fades = false;
     this.renderer = new Renderer(gl, this.memory, index.textures);
-    this.renderer.statues = walk.picture.renderer.statues;
+    const { light, statues } = walk.picture.renderer;
+    light?.illuminate(this.renderer);
+    this.renderer.statues = statues;
   }
 
   /** Requests the visible textures to the finest level that the view resolves; true once all are here. */

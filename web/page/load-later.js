@@ -5,6 +5,7 @@ export const loadComparison = () => import("./compare.js");
 /** @type {() => Promise<typeof import("../systems/statues.js")>} */
 // @ts-expect-error -- it is not beside its source
 export const loadStatues = () => import("./statues.js");
+export const loadLight = () => import("./light.js");
 export const loadReliefs = () => import("./reliefs.js");
 export const loadEmbedding = () => import("./embedded.js");
 export const loadTour = () => import("./tour.js");

@@ -7,7 +7,7 @@ import { fitting, levelsOf } from "./data/site.js";
 import { Reserve } from "./gl/reserve.js";
 import { TextureMemory } from "./gl/texture-memory.js";
 import { Viewport } from "./gl/viewport.js";
-import { loadComparison, loadReliefs, loadStatues } from "./load-later.js";
+import { loadComparison, loadLight, loadReliefs, loadStatues } from "./load-later.js";
 import { clock, Fetcher } from "./net/fetcher.js";
 import { watchLink } from "./net/timings.js";
 import { catalogueOf } from "./policy/catalogue.js";
@@ -48,8 +48,8 @@ export class Walkthrough {
   /** Times of the last look and of the frame before, s. */
   #looked = -1;
   #before = 0;
-  /** Whether the script of relief is on its way. */
-  #loading = false;
+  /** Scripts on their way: that of light is the first of two. */
+  #loading = 0;
   #reserve;
   #covered;
   #stillness = new Stillness();
@@ -98,7 +98,7 @@ export class Walkthrough {
     const picture = (this.picture = new Picture(gl, index, this.memory));
     const needs = (this.needs = new ViewNeeds(gl, client, textures));
     stream.follow(this.viewport).then((present) => present && needs.expect(present), () => {});
-    this.#relieve();
+    this.#equip();
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.memory.lose();
@@ -107,7 +107,7 @@ export class Walkthrough {
     canvas.addEventListener("webglcontextrestored", () => {
       picture.restore();
       needs.restore();
-      this.#relieve();
+      this.#equip();
       this.memory.resume();
       this.#compare();
     });
@@ -128,16 +128,17 @@ export class Walkthrough {
     this.emit(fatal ? "error" : "notice", error);
   };
 
-  /** Loads what draws objects with relief, if the site has any. */
-  #relieve() {
-    const { octrees, textures } = this.index;
+  /** Loads what draws light, and after it objects with relief, if the site has any. */
+  async #equip() {
+    const { light, octrees, textures } = this.index;
     const relieved = textures.some((row) => "relief" in row || row.normals);
-    if (!relieved && !octrees) return;
-    this.#loading = true;
-    (relieved ? loadReliefs() : loadStatues())
-      .then(({ show }) => show(this))
-      .catch(() => this.emit("notice", { message: page.unloaded }))
-      .finally(() => (this.#loading = false));
+    const relief = relieved ? loadReliefs() : octrees && loadStatues(), scripts = [light && loadLight(), relief];
+    this.#loading = scripts.length;
+    relief?.catch(() => {}); // below
+    for (const script of scripts) {
+      await script?.then(({ show }) => show(this)).catch(() => this.emit("notice", { message: page.unloaded }));
+      this.#loading--;
+    }
   }
 
   /** Cells visible from those that the visitor is in, his own first. */
@@ -194,6 +195,7 @@ export class Walkthrough {
     picture.cull(frustum, visible, stream.shapes, client.catalogue);
     until = clock() + time;
     if (this.memory.pump(now, late) || comparison?.memory.pump(now, late)) picture.touch();
+    renderer.light?.adapt(this, pose.eye, now);
     if (this.begun) {
       const lines = viewport.across(Math.PI / 2);
       renderer.statues?.advance(picture.drawn, pose.eye, lines, !stream.frozen && !document.hidden);
@@ -204,12 +206,12 @@ export class Walkthrough {
       const { progress, over } = beginningOf(this);
       this.emit("progress", progress);
       this.begun = this.#ready && !fence.busy;
-      this.#ready ||= over;
+      this.#ready ||= over && this.#loading < 2;
       if (this.begun) this.emit("first-picture", undefined);
     }
     const stands = !turns && stillness.moved < picture.painted;
     const waits = stands && !resized && (needs.items.busy || picture.waits(now));
-    if ((this.#ready || !this.#covered) && picture.changed > picture.painted && !waits) {
+    if (this.#loading < 2 && (this.#ready || !this.#covered) && picture.changed > picture.painted && !waits) {
       picture.paint(camera, now, comparison);
     }
     const room = this.cell < 0 || renderer.cells.has(this.cell);

@@ -8,8 +8,9 @@ import { weighLevels } from "./octree/weighing.js";
  * @param {import("../page/walkthrough.js").Walkthrough} walk
  */
 export function show(walk) {
-  const { gl, index, picture, stream: { site, fetcher } } = walk;
-  const statues = new Statues(gl, index.octrees ?? [], site, fetcher, walk.report, () => picture.touch());
-  picture.renderer.statues = statues;
+  const { gl, index, picture, picture: { renderer }, stream: { site, fetcher } } = walk;
+  const touch = () => picture.touch();
+  const statues = new Statues(gl, index.octrees ?? [], site, fetcher, walk.report, touch, renderer);
+  renderer.statues = statues;
   if (new URLSearchParams(location.search).get("octrees") === "best") weighLevels(walk, statues);
 }

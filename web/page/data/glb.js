@@ -18,6 +18,7 @@
  * @property {number} mesh the place of its object in the index, if that has finer meshes, or -1
  * @property {number} octree the place of its octree texture in the index, or -1
  * @property {number} light the lightmap of its cell in the index, or -1
+ * @property {number} white the light that its lightmap calls white, or that its colours are shares of; 0 if unlit
  * @property {Float32Array | null} spots u, v of each vertex in the lightmap, from the top left
  * @property {number} relief the place of the normal map of its object or its material in the index, or -1
  * @property {Float32Array[] | null} frames of the vertices in the normal map, as `Reliefs` checks them
@@ -174,7 +175,7 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, octree = -1, light = -1, normal = -1, normalCoords = 1, wrapS, wrapT } =
+      const { texture = -1, mesh = -1, octree = -1, light = -1, white = light < 0 ? 0 : NaN, normal = -1, normalCoords = 1, wrapS, wrapT } =
         look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
@@ -190,7 +191,7 @@ export async function readGlb(buffer, textures, decoder) {
         throw new Error("has a texture that is not in the index");
       }
       const factor = base.baseColorFactor ?? [1, 1, 1, 1];
-      if (!Array.isArray(factor) || factor.length !== 4 || !factor.every(Number.isFinite)) {
+      if (!Array.isArray(factor) || factor.length !== 4 || ![...factor, white].every(Number.isFinite) || white < 0) {
         throw new Error("has an invalid colour");
       }
       for (const each of [uvs, spots]) {
@@ -215,6 +216,7 @@ export async function readGlb(buffer, textures, decoder) {
         mesh,
         octree,
         light,
+        white,
         relief: normal,
         extras: JSON.stringify({ ...look.extras, mesh: 0 }),
         low,

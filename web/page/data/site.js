@@ -37,10 +37,17 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {boolean} [normals]
  * @property {number} [light]
  *
+ * @typedef {object} LightRow the curve and the surroundings of all light (docs/formats/hints.md)
+ * @property {number} stops
+ * @property {string} tone "plain", else that of `Light`
+ * @property {number[]} [sky]
+ * @property {number[]} [ground]
+ *
  * @typedef {object} CellRow
  * @property {string} name
  * @property {number[]} box
  * @property {boolean} [standing]
+ * @property {number} [exposure] of the picture that is seen from it
  * @property {string} record
  * @property {string} geometry
  * @property {number} recordBytes
@@ -62,6 +69,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {Viewpoint[]} viewpoints
  * @property {TextureRow[]} textures
  * @property {CellRow[]} cells
+ * @property {LightRow} [light]
  * @property {{cell: number, box: number[], errors: number[], files: string[], bytes: number[]}[]} [meshes]
  * @property {import("../../systems/octree/statues.js").OctreeRow[]} [octrees]
  * @property {string} [sets] the document of interlaced images
@@ -107,6 +115,9 @@ export class Site {
     if (!index.viewpoints.every(({ position, direction }) => [...position, ...direction].every(Number.isFinite))) {
       throw new Error("a view of no place");
     }
+    const { light: { stops = 1, sky = [], ground = [] } = {}, cells } = index;
+    const bright = [stops, ...sky, ...ground, ...cells.map(({ exposure = 1 }) => exposure)];
+    if (!bright.every((number) => number >= 0 && number < Infinity)) throw new Error("light of no brightness");
     this.index = index;
     this.address = address;
   }

@@ -9,7 +9,7 @@
  * @property {Shape} look of one of its shapes, whose look all have
  * @property {number} first index
  * @property {number} count of indices
- * @property {number[]} color r, g, b as sRGB encodes them, and opacity
+ * @property {number[]} color r, g, b as sRGB encodes them, of a lit surface in linear light, and opacity
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -17,7 +17,7 @@
 /**
  * @typedef {object} Packed
  * @property {Float32Array} data x, y, z, u, v of each vertex; its place u, v in the lightmap, if any has one;
- *   and its colour, if any has one: r, g, b, 1 as sRGB encodes them, in the bytes of one number
+ *   and its colour, if any has one: r, g, b, 1 as `codeOf` encodes them, in the bytes of one number
  * @property {boolean} lit whether they have a place in the lightmap
  * @property {boolean} painted whether they have a colour
  * @property {Uint16Array | Uint32Array} index
@@ -59,7 +59,7 @@ export function* pack(shapes) {
   const batches = [];
   let vertex = 0, at = 0;
   for (const group of groups.values()) {
-    const first = at;
+    const first = at, [look] = group, { factor, white } = look;
     for (const { positions, uvs, colors, spots, indices } of group) {
       yield;
       for (let k = 0; k < indices.length; k++) {
@@ -70,7 +70,7 @@ export function* pack(shapes) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
         for (let n = 0; n < 3; n++) data[width * vertex + n] = positions[3 * k + n];
         for (let n = 0; painted && n < 4; n++) {
-          bytes[4 * (width * (vertex + 1) - 1) + n] = colors ? 255 * encoded(colors[4 * k + n] / 65535) + 0.5 : 255;
+          bytes[4 * (width * (vertex + 1) - 1) + n] = colors ? 255 * codeOf(colors[4 * k + n] / 65535, white) + 0.5 : 255;
         }
         for (let n = 0; n < 2; n++) {
           if (uvs) data[width * vertex + 3 + n] = uvs[2 * k + n];
@@ -78,7 +78,7 @@ export function* pack(shapes) {
         }
       }
     }
-    const [look] = group, color = [...look.factor.slice(0, 3).map(encoded), look.factor[3]];
+    const color = white ? factor : [...factor.slice(0, 3).map(encoded), factor[3]];
     for (let from = first; from < at; from += MOST) {
       const part = index.subarray(from, Math.min(from + MOST, at));
       const box = boxOf(part, data, width);
@@ -148,6 +148,13 @@ export class CellBuffers {
     for (const buffer of this.buffers) this.gl.deleteBuffer(buffer);
   }
 }
+
+/**
+ * A component of the colour of a vertex in few bits: with light much of it may be far below white.
+ * @param {number} share of all light
+ * @param {number} white of the light on it, or 0
+ */
+export const codeOf = (share, white) => (white ? share ** 0.25 : encoded(share));
 
 /**
  * A component of linear light as sRGB encodes it (IEC 61966-2-1).

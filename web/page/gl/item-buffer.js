@@ -4,6 +4,7 @@
 import { ITEM_PIXELS } from "../policy/constants.js";
 import { Fence } from "./fence.js";
 import { aim, programOf } from "./program.js";
+import { ITEMS, PLACEHOLDERS } from "./shaders.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
 
@@ -35,8 +36,8 @@ export class ItemBuffer {
   constructor(gl) {
     this.gl = gl;
     this.fence = new Fence(gl);
-    this.item = programOf(gl, "item");
-    this.placeholder = programOf(gl, "placeholder");
+    this.item = programOf(gl, "item", ITEMS);
+    this.placeholder = programOf(gl, "placeholder", PLACEHOLDERS);
     this.#frame = gl.createFramebuffer();
     this.#depth = gl.createRenderbuffer();
     this.#colors = [gl.createRenderbuffer(), gl.createRenderbuffer()];

@@ -1,7 +1,5 @@
 // Compiles programs and looks up their uniforms.
 
-import { SOURCES } from "./shaders.js";
-
 /**
  * @typedef {object} Program
  * @property {WebGLProgram} program
@@ -11,10 +9,10 @@ import { SOURCES } from "./shaders.js";
 /**
  * @param {WebGL2RenderingContext} gl
  * @param {string} name
- * @param {string[]} [sources] of the shaders, if they are not in `SOURCES`
+ * @param {string[]} sources of the shaders
  * @returns {Program}
  */
-export function programOf(gl, name, sources = SOURCES[name]) {
+export function programOf(gl, name, sources) {
   const program = gl.createProgram();
   const kinds = [gl.VERTEX_SHADER, gl.FRAGMENT_SHADER];
   sources.forEach((source, k) => {

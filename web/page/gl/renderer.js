@@ -2,6 +2,7 @@
 
 import { CellBuffers, pack } from "./cell-buffers.js";
 import { aim, programOf } from "./program.js";
+import { SURFACES } from "./shaders.js";
 
 /** @typedef {import("./cell-buffers.js").Batch} Batch */
 /** @typedef {import("../data/glb.js").Shape} Shape */
@@ -16,9 +17,6 @@ import { aim, programOf } from "./program.js";
 
 /** @typedef {Pick<TextureMemory, keyof TextureMemory>} Textures a texture memory of any kind */
 /** @typedef {import("./texture-memory.js").TextureMemory} TextureMemory */
-
-/** The background. */
-const SKY = [0.16, 0.17, 0.19, 1];
 
 export class Renderer {
   /** @type {Map<number, CellBuffers>} */
@@ -35,9 +33,9 @@ export class Renderer {
     this.gl = gl;
     this.memory = memory;
     this.means = rows.map(({ color }) => color.map((part) => part / 255));
-    this.surface = programOf(gl, "surface");
-    /** Whether the light is baked: in lightmaps or at vertices. */
-    this.baked = rows.some((row) => "light" in row);
+    /** Light of the site, once its script is here. @type {import("../light.js").Light | null} */
+    this.light = null;
+    this.surface = this.compile("surface");
     /** Draws what has relief, if the site has any.
      * @type {Pick<import("../../systems/octree/statues.js").Statues, "delete" | "has" | "lacks" | "levels" | "advance">
      *   & Pick<import("../relief/reliefs.js").Reliefs, "draw"> & {bytes?: number} | null} */
@@ -76,6 +74,15 @@ export class Renderer {
     for (const cell of this.#packing.keys()) if (!wanted.has(cell)) this.#packing.delete(cell);
   }
 
+  /**
+   * A program for surfaces, in the light of the site.
+   * @param {string} name
+   * @param {string[]} [sources] of the shaders
+   */
+  compile(name, sources = SURFACES) {
+    return programOf(this.gl, name, this.light?.sources(sources) ?? sources);
+  }
+
   delete() {
     this.keep(new Set());
     this.gl.deleteProgram(this.surface.program);
@@ -96,7 +103,7 @@ export class Renderer {
    */
   draw(camera, drawn, now) {
     const { gl, surface } = this;
-    gl.clearColor(SKY[0], SKY[1], SKY[2], 1);
+    gl.clearColor(0.16, 0.17, 0.19, 1);
     gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
@@ -122,6 +129,7 @@ export class Renderer {
       fading = this.statues?.draw(camera, statues, paint, now) || fading;
       gl.useProgram(surface.program);
     }
+    this.light?.surround(this, camera);
     if (behind.length) {
       gl.enable(gl.BLEND);
       gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
@@ -130,7 +138,6 @@ export class Renderer {
         gl.bindVertexArray(buffers.vertexArray);
         fading = this.#draw(buffers, batch, now) || fading;
       }
-      gl.depthMask(true);
     }
     gl.bindVertexArray(null);
     return fading;
@@ -155,7 +162,7 @@ export class Renderer {
    */
   #paint(at, batch, now) {
     const { gl } = this;
-    const { texture, light, clampU, clampV, cutoff, twoSided } = batch.look;
+    const { texture, clampU, clampV, cutoff, twoSided } = batch.look;
     (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
     gl.uniform4fv(at.color, batch.color);
     gl.uniform1f(at.cutoff, cutoff);
@@ -163,17 +170,8 @@ export class Renderer {
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);
     if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
-    let fading = false, lit = +this.baked;
-    if (light >= 0) {
-      const map = this.memory.of(light);
-      gl.activeTexture(gl.TEXTURE1);
-      fading = map?.bind(true, true, now) ?? false;
-      gl.activeTexture(gl.TEXTURE0);
-      gl.uniform1i(at.lightmap, 1);
-      lit = map ? -1 : Math.max(this.means[light][0], 1e-3);
-    }
-    gl.uniform1f(at.lit, lit);
-    return storage?.bind(clampU, clampV, now) || fading;
+    const fading = this.light?.paint(this, at, batch.look, now);
+    return /** @type {boolean} */ (storage?.bind(clampU, clampV, now) || fading);
   }
 }
 

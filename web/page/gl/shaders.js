@@ -37,18 +37,15 @@ vec4 texel() {
 }`;
 
 /**
- * Surfaces with a texture are unlit, as in VRML browsers; the rest glow a little and are lit from the eye. A
- * lightmap multiplies this, and surfaces without texture then glow more, also those with light at vertices. Colours multiply as they are encoded.
+ * Surfaces with a texture are unlit, as in VRML browsers; the rest glow a little and are lit from the eye. Colours
+ * multiply as they are encoded. `Light` changes this one, and others with the same expressions.
  */
 const SURFACE = `#version 300 es
 precision highp float;
 in vec3 seen;
 in vec2 uv;
-in vec2 spot;
 in vec3 painted;
 uniform float cutoff;
-uniform sampler2D lightmap;
-uniform float lit; // linear light, 1 at vertices, and until the lightmap arrives; -1 with it, 0 without light
 out vec4 shown;
 ${TEXEL}
 void main() {
@@ -56,12 +53,11 @@ void main() {
   float light = 1.0;
   if (!textured) {
     sampled = vec4(1.0);
-    float glow = lit != 0.0 ? 0.7 : 0.25;
+    float glow = 0.25;
     vec3 normal = cross(dFdx(seen), dFdy(seen));
     float size = length(normal);
     light = glow + (1.0 - glow) * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
   }
-  if (lit != 0.0) light *= 1.055 * pow(lit < 0.0 ? texture(lightmap, spot).r : lit, 1.0 / 2.4) - 0.055;
   shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
   if (shown.a < max(cutoff, 0.004)) discard;
   if (cutoff > 0.0) shown.a = 1.0;
@@ -106,11 +102,5 @@ layout(location = 1) out vec4 shown;
 ${BYTES}
 void main() { shown = vec4(bytes(item), 0.0, 1.0); }`;
 
-/** @type {Record<string, string[]>} */
-export const SOURCES = {
-  surface: [corners(`
-layout(location = 3) in vec2 place2;
-out vec2 spot;`, "spot = place2;"), SURFACE],
-  item: [corners(), ITEM],
-  placeholder: [corners(), PLACEHOLDER],
-};
+/** The shaders of each program. */
+export const SURFACES = [corners(), SURFACE], ITEMS = [corners(), ITEM], PLACEHOLDERS = [corners(), PLACEHOLDER];

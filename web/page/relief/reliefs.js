@@ -4,9 +4,9 @@
 // the texture beside it. Objects are lit as octree textures are; a material's map changes its colours by the
 // share by which the light on its normals differs from that on the face.
 
-import { encoded, lookOf } from "../gl/cell-buffers.js";
-import { aim, programOf } from "../gl/program.js";
-import { corners, SOURCES, TEXEL } from "../gl/shaders.js";
+import { codeOf, lookOf } from "../gl/cell-buffers.js";
+import { aim } from "../gl/program.js";
+import { corners, SURFACES, TEXEL } from "../gl/shaders.js";
 import { PageError } from "../net/errors.js";
 import { LIT } from "./lamp.js";
 import { distance } from "../space/frustum.js";
@@ -24,9 +24,9 @@ const WHOLE = { normalWrapS: CLAMP, normalWrapT: CLAMP };
 const NEAREST = 0.1;
 
 const VERTEX = corners(`
-layout(location = 3) in vec2 second;
-layout(location = 4) in vec3 up;
-layout(location = 5) in vec4 right;
+layout(location = 4) in vec2 second;
+layout(location = 5) in vec3 up;
+layout(location = 6) in vec4 right;
 out vec2 at;
 out mat3 axes;`, "at = second; axes = mat3(right.xyz, right.w * cross(up, right.xyz), up);");
 
@@ -54,10 +54,8 @@ void main() {
 const LAMPLIGHT = LIT.replace("lit", "lamplight");
 /** The axes of the map follow from the derivatives, exactly: positions are linear in it. Its y is up, v is down. */
 const BUMPS = [corners(`
-layout(location = 3) in vec2 place2;
-layout(location = 4) in vec2 place3;
-out vec2 spot;
-out vec2 at;`, "spot = place2; at = place3;"), SOURCES.surface[1].replace("out vec4 shown;", `out vec4 shown;
+layout(location = 4) in vec2 second;
+out vec2 at;`, "at = second;"), SURFACES[1].replace("out vec4 shown;", `out vec4 shown;
 uniform mat3 turn;
 uniform sampler2D relief;
 uniform float scale;
@@ -97,11 +95,11 @@ export class Reliefs {
    * @param {import("../walkthrough.js").Walkthrough} walk
    */
   constructor(walk) {
-    const { gl } = walk;
+    const { gl, picture: { renderer } } = walk;
     this.gl = gl;
     this.walk = walk;
-    this.program = programOf(gl, "relief", [VERTEX, FRAGMENT]);
-    this.bumps = programOf(gl, "bumps", BUMPS);
+    this.program = renderer.compile("relief", [VERTEX, FRAGMENT]);
+    this.bumps = renderer.compile("bumps", BUMPS);
     weigh(walk.client.catalogue, walk.index.textures);
   }
 
@@ -269,17 +267,16 @@ export class Reliefs {
   #part(shape) {
     const known = this.#parts.get(shape);
     if (known) return known;
-    const { gl } = this, { positions, uvs, colors, indices, frames, spots } = shape;
+    const { gl } = this, { positions, uvs, colors, indices, frames, spots, white } = shape;
     const array = gl.createVertexArray(), count = indices.length;
     gl.bindVertexArray(array);
     /** @type {WebGLBuffer[]} */
     const buffers = [];
     const [places, normals, tangents = null] = /** @type {Float32Array[]} */ (frames);
-    const painted = colors && Float32Array.from(colors, (light) => encoded(light / 65535));
+    const painted = colors && Float32Array.from(colors, (light) => codeOf(light / 65535, white));
     /** @type {[number, Float32Array | null, number][]} */
-    const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4]];
-    if (isBump(shape)) rows.push([3, spots, 2], [4, places, 2]);
-    else rows.push([3, places, 2], [4, normals, 3], [5, tangents, 4]);
+    const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4], [3, spots, 2], [4, places, 2]];
+    if (!isBump(shape)) rows.push([5, normals, 3], [6, tangents, 4]);
     for (const [location, data, size] of rows) {
       if (!data) continue;
       buffers.push(this.#buffer(gl.ARRAY_BUFFER, data));

@@ -3,7 +3,7 @@
 
 import { clock } from "../../page/net/fetcher.js";
 import { PageError } from "../../page/net/errors.js";
-import { aim, programOf } from "../../page/gl/program.js";
+import { aim } from "../../page/gl/program.js";
 import { corners, TEXEL } from "../../page/gl/shaders.js";
 import { distance } from "../../page/space/frustum.js";
 import { LIT } from "../../page/relief/lamp.js";
@@ -68,8 +68,9 @@ export class Statues {
    * @param {import("../../page/net/fetcher.js").Fetcher} fetcher
    * @param {(fault: PageError) => void} report
    * @param {() => void} touch called when the picture changes
+   * @param {import("../../page/gl/renderer.js").Renderer} renderer that they are drawn for
    */
-  constructor(gl, rows, site, fetcher, report, touch) {
+  constructor(gl, rows, site, fetcher, report, touch, renderer) {
     this.gl = gl;
     this.site = site;
     this.fetcher = fetcher;
@@ -85,7 +86,7 @@ export class Statues {
         return null;
       }
     });
-    this.program = programOf(gl, "octree", [VERTEX, FRAGMENT]);
+    this.program = renderer.compile("octree", [VERTEX, FRAGMENT]);
   }
 
   delete() {
