@@ -283,9 +283,11 @@ def _strengthened(lamps: Lamps, factors: tuple[float, float, float]) -> Lamps:
 
 
 def _visible_sides(pieces: Sequence[CellSurfaces], count: int) -> Bools:
-    """(count, 2) which sides of faces pieces of cells show."""
+    """(count, 2) which sides of faces pieces of cells show; both of those without pieces, which
+    others in the same place may hide."""
     seen = np.zeros((count, 2), np.bool_)
     for piece in pieces:
         seen[piece.face[piece.side >= 0], 0] = True
         seen[piece.face[piece.side <= 0], 1] = True
+    seen[~seen.any(axis=1)] = True
     return seen

@@ -81,7 +81,7 @@ def bake_cell(
 
 #: Quality of the images of lightmaps. (WebP 85 takes a quarter more bytes, and has blocks on smooth
 #: walls.)
-_QUALITY = {"avif": 65, "webp": 85}
+_QUALITY = {"avif": 85, "webp": 90}
 
 
 def lossy_light(texels: NDArray[np.uint8]) -> tuple[str, bytes]:
@@ -206,7 +206,7 @@ def _kind_of_light(baking: LightBaking) -> Mapping[str, Any]:
 
 def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, NDArray[np.float64]]:
     """The factor of all light with which the building has the usual exposure, and (C,) the factors
-    of cells: of what is seen from a cell, half is in its neighbours."""
+    of cells: some of what is seen from a cell is in its neighbours."""
     import numpy as np
 
     wanted, area = np.array([light.exposure for light in cell_lights]).reshape(-1, 2).T
@@ -216,8 +216,10 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
     usual = float(standing @ wanted / standing.sum())
     total, weight = wanted * area, area.copy()
     for cell, near in enumerate(cells.adjacent()):
-        total[cell] += (wanted[near] * area[near]).sum() / 2
-        weight[cell] += area[near].sum() / 2
+        # A large hall beside a small room is seen through a door.
+        beside = np.minimum(area[near], area[cell]) / 4
+        total[cell] += wanted[near] @ beside
+        weight[cell] += beside.sum()
     own = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
     return math.exp(usual), np.exp(np.clip(own - usual, -_MOST_STOPS, _MOST_STOPS))
 
