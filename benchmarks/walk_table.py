@@ -43,12 +43,12 @@ from scenes import FOLDER, ROOT, SCENES, WALKS, database_of, make_scenes, walk_f
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
 from ptmtools.quantities import parse_bandwidth, parse_memory
-from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
-from ptmtools.rendering.records import Lossy, Pyramids
+from ptmtools.rendering.records import Pyramids
 from ptmtools.walk import read_walk
 from ptmtools_lab.comparing import budget_of
 from ptmtools_lab.forms import PTM
+from ptmtools_lab.lossy import Lossy, read_lossy
 from ptmtools_lab.measures import STANDS, measure
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.simulation import simulate

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress
-from ptmtools.rendering.pyramids import mip_levels, mip_sizes, pack_pyramids, rgb
+from ptmtools.rendering.pyramids import in_colors, pack_pyramids
 from ptmtools.rendering.records import Pyramids, Shows
 from ptmtools.texture.model import Limits, gpu_texel_bytes
 from ptmtools_lab.catalogue import Columns, align_columns, columns_of
@@ -115,6 +115,30 @@ def shows(served: Served, levels: Pyramids, progress: Progress) -> Shows:
     return Shows(pyramids, row, resident, counts, levels.mean)
 
 
+def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
+    """Yields the sizes of an image and of its mip levels, the finest first."""
+    yield width, height
+    while max(width, height) > 1:
+        width, height = max(1, width >> 1), max(1, height >> 1)
+        yield width, height
+
+
+def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+    """Returns the mip levels of an (h, w, 3) image with power-of-two sides, the coarsest first:
+    rounded means of 2 × 2 texels."""
+    levels = [image]
+    while max(image.shape[:2]) > 1:
+        for axis in (0, 1):
+            if image.shape[axis] == 1:
+                image = np.repeat(image, 2, axis=axis)
+        total = np.full((image.shape[0] >> 1, image.shape[1] >> 1, 3), 2, np.uint16)
+        for y, x in np.ndindex(2, 2):
+            total += image[y::2, x::2]
+        image = (total >> 2).astype(np.uint8)
+        levels.append(image)
+    return levels[::-1]
+
+
 def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
     """(h, w, 3) images of the first file, of the first two, …"""
     folder, interlaced = _manifest(served, texture)
@@ -126,7 +150,7 @@ def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
         except InputError as fault:
             raise _damage(fault) from None
         image = texels if image is None or part.axis is None else join(image, texels, part.axis)
-        yield rgb(image)
+        yield np.ascontiguousarray(in_colors(image)[..., :3])
 
 
 def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:

@@ -27,14 +27,14 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import kernel, plain_kernel
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
-from ptmtools.rendering.kernels import GREY, Sums, blend, distance, texel_under
+from ptmtools.rendering.kernels import GREY, blend, texel_under
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.pyramids import full_colors
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
 from ptmtools.site.client import LEAST_DIFFERENCE
 from ptmtools_lab.catalogue import Catalogue, Columns, Shapes, align_columns
-from ptmtools_lab.rows import RowSums
+from ptmtools_lab.rows import RowSums, Sums, distance
 from ptmtools_systems.apo.lighting import depth_of, descend, stop_of
 from ptmtools_systems.apo.model import Octrees
 from ptmtools_systems.apo.served_octrees import level_differences

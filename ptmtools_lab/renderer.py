@@ -13,10 +13,10 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.rendering.light import lamps
-from ptmtools.rendering.lossy import pictures
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels
 from ptmtools.rendering.tone import LitSurfaces, show_vertex_light, tone_at
+from ptmtools_lab.lossy import pictures
 
 if TYPE_CHECKING:
     from ptmtools_lab.world import World

@@ -37,7 +37,7 @@ class WalkRun:
         visible set.
     memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
     column, state: (F, T) resident column of each texture, and its state
-        (`ptmtools.rendering.lossy`). loaded: (F, C) whether the geometry is loaded.
+        (`ptmtools_lab.lossy`). loaded: (F, C) whether the geometry is loaded.
     body, overhead: bytes received of bodies and headers.
     documents: bytes of other bodies than textures and geometry.
     useful: bytes of textures and geometry that were displayed.

@@ -9,7 +9,7 @@ missing cells are grey.
 
 The same rays serve textures in several forms (`ptmtools_lab.forms`). A pixel samples each level of
 one pyramid once; a form whose steps are pyramids of their own (`Shows`) costs a sample of each, and
-so does each level of a lossy preview (`ptmtools.rendering.lossy`).
+so does each level of a lossy preview (`ptmtools_lab.lossy`).
 
 The level of detail is that of a screen of 1080 lines, whatever the size of the item buffer: a
 coarser buffer samples fewer pixels of the same picture.
@@ -28,12 +28,12 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.rays import Caster, RayCamera
-from ptmtools.rendering.records import Lossy, Pyramids, Shows, Sight, Triangles, triangles_of
+from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles, triangles_of
 from ptmtools.site.client import NORMALS
+from ptmtools_lab.lossy import Lossy, no_previews
 from ptmtools_lab.relief import Relief, ReliefTally
-from ptmtools_lab.rows import RowSums, ViewRows
+from ptmtools_lab.rows import RowSums, ViewRows, add_columns, add_frame
 
 
 @dataclass(frozen=True)
@@ -178,8 +178,6 @@ class _Tally:
         full: Pyramids,
         seen: Bools,
     ) -> None:
-        from ptmtools.rendering.kernels import add_columns, add_frame
-
         self._add: Callable[..., None]
         if isinstance(textures, Shows):
             self._add, levels = add_columns, textures.row.shape[1] - 1

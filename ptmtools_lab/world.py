@@ -20,16 +20,16 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.rays import Frustum, RayCamera
-from ptmtools.rendering.records import Lossy, Pyramids, Shows
+from ptmtools.rendering.records import Pyramids, Shows
 from ptmtools.rendering.tone import show_vertex_light
 from ptmtools.site.client import ITEM_PIXELS
 from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps
 from ptmtools.walk import Browser
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
 from ptmtools_lab.forms import FORMS, PTM
+from ptmtools_lab.lossy import Lossy, read_lossy
 from ptmtools_lab.relief import Relief
 from ptmtools_lab.tables import PLAIN, Drawing, WalkViews, look
 from ptmtools_lab.track import RATE, Track, track_of

@@ -1,7 +1,7 @@
 """Draws a view of a served database with the finest levels of its textures.
 
-Embree finds the surface of each ray and the layers before it (`ptmtools.rendering.layers`), and the
-kernels of the simulator sample the textures. A lit picture has the lamp of
+Embree finds the surface of each ray and the layers before it (`ptmtools.rendering.layers`), and
+compiled kernels sample the textures. A lit picture has the lamp of
 `ptmtools.rendering.light`, and the relief of octree textures and of the normal maps of objects.
 Others have baked light (`ptmtools.rendering.tone`), and shade other surfaces without texture by the
 angle to the viewer, like the web page. All have the normal maps of materials.

@@ -18,8 +18,7 @@ from ptmtools.rendering.footprints import show_colors
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.normal_maps import show_bumps, show_relief
-from ptmtools.rendering.previews import Texels
-from ptmtools.rendering.pyramids import alpha_of, read_levels, read_pyramids
+from ptmtools.rendering.pyramids import Texels, alpha_of, read_levels, read_pyramids
 from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels
 from ptmtools.rendering.tone import SKY, LitSurfaces, Tone
 

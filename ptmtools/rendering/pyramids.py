@@ -1,9 +1,16 @@
-"""All levels of all textures as one array of 8-bit RGB, for kernels that sample them."""
+"""All levels of all textures as one array of 8-bit RGB, for kernels that sample them.
+
+Levels come from a `.ptm`, or from a preview: an ordinary lossy image of a single level. A preview
+of level n shows that level and, halved by means of 2 × 2 texels, all coarser ones. Its image is as
+Pillow decodes it; browsers decode JPEG with other chroma filters, which moves single texels by a
+few steps of 255.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -15,12 +22,15 @@ from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import BUILD, Served
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.previews import Texels, read_preview
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between, with_offset
 from ptmtools.texture.model import Limits
+from ptmtools.texture.previews import decode_preview
+from ptmtools.texture.pyramid import build_pyramid
 from ptmtools.texture.samples import in_eight_bits
+
+Texels = NDArray[np.uint8]
 
 #: Limit on the memory that decoding a texture may take.
 _LIMITS = Limits(decoded_bytes=1 << 33)
@@ -91,6 +101,34 @@ def _levels(served: Served, texture: int) -> list[Texels]:
     return levels
 
 
+def read_preview(served: Served, texture: int, number: int, *, alpha: bool = False) -> list[Texels]:
+    """The levels of a preview, the coarsest first, as (h, w, 3) RGB, or with ``alpha`` (h, w, 4),
+    without offsets.
+
+    Raises DatabaseError: PTM-D005, D006 it is missing, damaged or does not match the index.
+    """
+    row = served.index["textures"][texture]
+    preview = row["previews"][number]
+    file = served.file(preview["file"])
+    sizes = sizes_of(row)[: preview["level"] + 1]
+    levels = build_pyramid(_decode(file, served.read(preview["file"]), 3 + alpha))[-len(sizes) :]
+    if [level.shape[1::-1] for level in levels] != sizes:
+        raise _damage_error(file, "does not match the index")
+    return [np.ascontiguousarray(level) for level in levels]
+
+
+def _decode(file: Path, data: bytes, components: int) -> Texels:
+    """(h, w, components) the texels of an image."""
+    try:
+        return decode_preview(data, components)
+    except (OSError, ValueError, SyntaxError) as fault:
+        raise _damage_error(file, f"cannot be decoded ({fault})") from None
+
+
+def _damage_error(file: Path, problem: str) -> DatabaseError:
+    return DatabaseError("PTM-D006", problem, file=file, remedy=BUILD)
+
+
 def alpha_of(levels: Sequence[Texels]) -> Pyramids:
     """The alpha of the (h, w, 4) levels of a texture, as the colours of another."""
     return pack_pyramids([[np.repeat(level[..., 3:], 3, axis=2) for level in levels]])
@@ -125,38 +163,9 @@ def full_colors(sight: Sight, triangles: Triangles, pyramids: Pyramids) -> Float
     return result
 
 
-def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
-    """Yields the sizes of an image and of its mip levels, the finest first."""
-    yield width, height
-    while max(width, height) > 1:
-        width, height = max(1, width >> 1), max(1, height >> 1)
-        yield width, height
-
-
-def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """Returns the mip levels of an (h, w, 3) image with power-of-two sides, the coarsest first:
-    rounded means of 2 × 2 texels."""
-    levels = [image]
-    while max(image.shape[:2]) > 1:
-        for axis in (0, 1):
-            if image.shape[axis] == 1:
-                image = np.repeat(image, 2, axis=axis)
-        total = np.full((image.shape[0] >> 1, image.shape[1] >> 1, 3), 2, np.uint16)
-        for y, x in np.ndindex(2, 2):
-            total += image[y::2, x::2]
-        image = (total >> 2).astype(np.uint8)
-        levels.append(image)
-    return levels[::-1]
-
-
 def in_colors(samples: NDArray[Any]) -> Texels:
     """Converts (h, w, c) samples of any type to (h, w, 3) RGB, or (h, w, 4) with alpha."""
     shown, components = in_eight_bits(samples), samples.shape[2]
     if components < 3:
         return shown[..., [0, 0, 0, 1][: components + 2]]
     return shown[..., : 3 + (components == 4)]
-
-
-def rgb(samples: NDArray[Any]) -> Texels:
-    """Converts (h, w, c) samples of any type to (h, w, 3) RGB."""
-    return np.ascontiguousarray(in_colors(samples)[..., :3])

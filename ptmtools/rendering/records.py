@@ -34,27 +34,6 @@ class Pyramids(NamedTuple):
     differences: Floats
 
 
-class Lossy(NamedTuple):
-    """Pictures of the lossy previews of textures.
-
-    Attributes
-    ----------
-    pyramids: a pyramid for each of Q previews, texture by texture, by ascending level; their levels
-        are those of the texture, from the coarsest to that of the preview.
-    first: (T + 1,) where the previews of each texture begin.
-    state: (Q,) the state before the first one of each preview.
-    """
-
-    pyramids: Pyramids
-    first: Ints
-    state: Ints
-
-    @property
-    def states(self) -> int:
-        """The greatest number of a state of lossy previews, 0 without any."""
-        return int((self.state + self.pyramids.levels).max(initial=0))
-
-
 class Shows(NamedTuple):
     """Pictures of the columns of textures (`Catalogue`): each the coarsest levels of a pyramid.
 

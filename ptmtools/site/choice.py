@@ -22,7 +22,6 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import plain_kernel
-from ptmtools.rendering.lossy import states_of
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 
 
@@ -37,7 +36,7 @@ class Previews(NamedTuple):
     difference: (P,) mean difference of its texels to the exact ones, 0 to 255; 0 for an exact one,
         else at least `LEAST_DIFFERENCE`.
     exact: (P,) whether it is the exact form of its texture.
-    state: (P,) the state before its first one, see `ptmtools.rendering.lossy`.
+    state: (P,) the state before its first one, see `states_of`.
     """
 
     texture: Ints
@@ -68,6 +67,23 @@ class Previews(NamedTuple):
         """The same previews of the first of more textures."""
         more = textures + 1 - len(self.first)
         return self._replace(first=np.pad(self.first, (0, more), "edge"))
+
+
+def states_of(texture: Mapping[str, Any]) -> list[int]:
+    """The state before the first one of each preview of a row of the index.
+
+    *States* number the pictures that a texture can have. State 0 is nothing; states 1 to M are the
+    columns of the exact levels, M of them; then come the columns of each lossy preview, 1 to its
+    level + 1. A preview that is the exact form of its texture has the states of the exact levels.
+    """
+    previews = texture.get("previews", ())
+    finest = previews[-1]["level"] + 1 if previews else 0
+    result, following = [], max(len(texture["ends"]), finest)
+    for preview in previews:
+        lossy = not preview.get("exact", False)
+        result.append(following if lossy else 0)
+        following += (preview["level"] + 1) * lossy
+    return result
 
 
 def no_previews(textures: int) -> Previews:

@@ -28,8 +28,7 @@ from ptmtools.output.served import Served
 from ptmtools.parallel import map_in_order
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.layers import Layer, Layers, blend, transparent_of
-from ptmtools.rendering.previews import read_preview
-from ptmtools.rendering.pyramids import in_colors
+from ptmtools.rendering.pyramids import in_colors, read_preview
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Sight, Triangles
 from ptmtools.rendering.tone import LitSurfaces, Tone, tone_at

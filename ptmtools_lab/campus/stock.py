@@ -31,11 +31,12 @@ from ptmtools.files import open_below
 from ptmtools.glb import glb_chunks
 from ptmtools.output.served import on_link
 from ptmtools.output.surfaces import Surfaces, stack_rows
-from ptmtools.rendering.pyramids import mip_levels, pack_pyramids
+from ptmtools.rendering.pyramids import pack_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.scene.colors import to_srgb
 from ptmtools.texture.images.opening import load, open_image, pillow_faults
 from ptmtools.texture.model import Limits
+from ptmtools_lab.forms import mip_levels
 from ptmtools_systems.campus.meshes import Primitive, read_mesh, view_bytes
 from ptmtools_systems.campus.model import (
     CHANNELS,

@@ -33,13 +33,14 @@ from ptmtools.jit import plain_kernel
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.kernels import GREY, blend, distance, texel_under
+from ptmtools.rendering.kernels import GREY, blend, texel_under
 from ptmtools.rendering.pyramids import full_colors, read_pyramids
 from ptmtools.rendering.rays import Caster, Frustum, RayCamera
 from ptmtools.rendering.records import Pyramids, Sight, Triangles, triangles_of
 from ptmtools.rendering.tone import show_vertex_light
 from ptmtools.walk import Walk
 from ptmtools_lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
+from ptmtools_lab.rows import distance
 from ptmtools_lab.track import RATE, frame_times
 from ptmtools_lab.world import PIXELS
 from ptmtools_systems.campus.model import SIZES

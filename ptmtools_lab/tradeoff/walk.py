@@ -25,13 +25,13 @@ from ptmtools.pipeline.artifacts import Artifacts
 from ptmtools.pipeline.warm_up import warm_building
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import MemorySize, count, size
-from ptmtools.rendering.lossy import read_lossy
 from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Pyramids
 from ptmtools.walk import Walk
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
 from ptmtools_lab.comparing import SimulateOptions, apply_counting, budget_of, play, require_hints
 from ptmtools_lab.forms import PTM
+from ptmtools_lab.lossy import read_lossy
 from ptmtools_lab.measures import SHARES
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.report import rate_text

@@ -16,11 +16,11 @@ from ptmtools.errors import DatabaseError, InputError
 from ptmtools.link import Conditions
 from ptmtools.output.served import read_served
 from ptmtools.rendering.kernels import GREY
-from ptmtools.rendering.pyramids import mip_levels, mip_sizes, read_pyramids
+from ptmtools.rendering.pyramids import read_pyramids
 from ptmtools.rendering.records import Shows, own_levels
 from ptmtools.texture import decode
 from ptmtools_lab.comparing import SimulateOptions, apply_counting, budget_of, play
-from ptmtools_lab.forms import PTM
+from ptmtools_lab.forms import PTM, mip_levels, mip_sizes
 from ptmtools_lab.measures import Flip
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.renderer import FrameRenderer

@@ -13,12 +13,12 @@ from PIL import Image
 
 from ptmtools.errors import MissingComponentError
 from ptmtools.output.surfaces import Surfaces
-from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.rays import RayCamera
 from ptmtools.rendering.records import Pyramids
 from ptmtools_lab import measures as flips
 from ptmtools_lab.comparing import SimulateOptions, play
 from ptmtools_lab.figures import frames, strip
+from ptmtools_lab.lossy import no_previews
 from ptmtools_lab.renderer import FrameRenderer
 from ptmtools_lab.world import World
 

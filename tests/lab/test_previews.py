@@ -21,10 +21,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import DatabaseError
 from ptmtools.link import Conditions
 from ptmtools.output.served import Served, read_served
-from ptmtools.rendering.lossy import pictures, read_lossy
-from ptmtools.rendering.previews import read_preview
-from ptmtools.rendering.pyramids import pack_pyramids, read_pyramids
-from ptmtools.rendering.records import Lossy
+from ptmtools.rendering.pyramids import pack_pyramids, read_preview, read_pyramids
 from ptmtools.site.choice import Previews, next_fetch, previews_of
 from ptmtools.site.client import AVERAGING, LEAST_DIFFERENCE
 from ptmtools.texture import decode, encode, read_header
@@ -32,6 +29,7 @@ from ptmtools.walk import read_walk
 from ptmtools_lab.allocation import choose_sources
 from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.client import Client, FileKind
+from ptmtools_lab.lossy import Lossy, pictures, read_lossy
 from ptmtools_lab.network import FluidLink
 from ptmtools_lab.policies import POLICIES
 from ptmtools_lab.policies.engine import _drops

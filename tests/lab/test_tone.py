@@ -20,7 +20,6 @@ from ptmtools.output.surfaces import Surfaces
 from ptmtools.progress import silent
 from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.kernels import GREY
-from ptmtools.rendering.lossy import no_previews
 from ptmtools.rendering.painting import SurfacePainter
 from ptmtools.rendering.pyramids import pack_pyramids
 from ptmtools.rendering.rays import Caster, RayCamera
@@ -28,6 +27,7 @@ from ptmtools.rendering.records import Sight
 from ptmtools.rendering.tone import GLOW, LIT_GLOW, SKY, Tone, show_vertex_light, tone_of
 from ptmtools.scene.colors import to_linear
 from ptmtools.site.pictures import PictureKind, _Scene, _Textures
+from ptmtools_lab.lossy import no_previews
 from ptmtools_lab.renderer import FrameRenderer
 from tests.lab.worlds import leaf
 

@@ -15,7 +15,6 @@ from PIL import Image
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.rendering.pyramids import mip_levels
 from ptmtools.rendering.rays import RayCamera
 from ptmtools.walk import Walk
 from ptmtools_lab.campus.options import CampusWalkOptions
@@ -32,6 +31,7 @@ from ptmtools_lab.campus.world import (
     look,
     prepare_campus,
 )
+from ptmtools_lab.forms import mip_levels
 from ptmtools_systems.campus import read_campus
 from ptmtools_systems.campus.meshes import read_mesh
 from ptmtools_systems.campus.model import SIZES

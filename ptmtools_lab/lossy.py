@@ -1,41 +1,45 @@
-"""Pictures of lossy previews, and the states of textures that have some.
-
-*States* number the pictures that a texture can have. State 0 is nothing; states 1 to M are the
-columns of the exact levels, M of them; then come the columns of each lossy preview, 1 to its level
-+ 1. A preview that is the exact form of its texture has the states of the exact levels.
-"""
+"""Pictures of lossy previews, by the states of textures (`ptmtools.site.choice.states_of`)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
+from ptmtools.arrays import Ints
 from ptmtools.output.model import offsets_of
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress, silent
-from ptmtools.rendering.previews import Texels, read_preview
-from ptmtools.rendering.pyramids import pack_pyramids
-from ptmtools.rendering.records import Lossy, Pyramids, Shows, own_levels
+from ptmtools.rendering.pyramids import Texels, pack_pyramids, read_preview
+from ptmtools.rendering.records import Pyramids, Shows, own_levels
+from ptmtools.site.choice import states_of
 from ptmtools.texture.detail import with_offset
+
+
+class Lossy(NamedTuple):
+    """Pictures of the lossy previews of textures.
+
+    Attributes
+    ----------
+    pyramids: a pyramid for each of Q previews, texture by texture, by ascending level; their levels
+        are those of the texture, from the coarsest to that of the preview.
+    first: (T + 1,) where the previews of each texture begin.
+    state: (Q,) the state before the first one of each preview.
+    """
+
+    pyramids: Pyramids
+    first: Ints
+    state: Ints
+
+    @property
+    def states(self) -> int:
+        """The greatest number of a state of lossy previews, 0 without any."""
+        return int((self.state + self.pyramids.levels).max(initial=0))
 
 
 def no_previews(textures: int) -> Lossy:
     """The pictures of ``textures`` without previews."""
     return Lossy(pack_pyramids([]), np.zeros(textures + 1, np.int64), np.zeros(0, np.int64))
-
-
-def states_of(texture: Mapping[str, Any]) -> list[int]:
-    """The state before the first one of each preview of a row of the index."""
-    previews = texture.get("previews", ())
-    finest = previews[-1]["level"] + 1 if previews else 0
-    result, following = [], max(len(texture["ends"]), finest)
-    for preview in previews:
-        lossy = not preview.get("exact", False)
-        result.append(following if lossy else 0)
-        following += (preview["level"] + 1) * lossy
-    return result
 
 
 def read_lossy(served: Served, progress: Progress = silent) -> Lossy:
