@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.embree import ray_tree
 from ptmtools.executor import Executor
-from ptmtools.light.looks import RayLight as Light
-from ptmtools.light.occlusion import Occluders, points_on
+from ptmtools.light.occlusion import Occluders, normals, points_on
 from ptmtools.pipeline.stages import SCENE
 from ptmtools.pipeline.warm_up import warm_objects
 from ptmtools.scene.model import Scene, SourceImage
@@ -44,6 +43,7 @@ from ptmtools_systems.apo.normals import corner_normals
 from ptmtools_systems.apo.traversal import look_up
 from ptmtools_systems.campus.making import levels
 from ptmtools_systems.campus.objects import ObjectPart, parts_of
+from ptmtools_systems.campus.obscurance import light
 from ptmtools_systems.campus.options import MAX_SAMPLES, CampusOptions
 from ptmtools_systems.campus.textures import jpeg, square_image
 from ptmtools_systems.interlace.model import InterlaceOptions
@@ -312,11 +312,11 @@ def light_experiment(
         share = area / area.sum() if area.sum() else np.full(len(area), 1 / len(area))
         chosen.append(random.choice(part.triangles, POINTS, p=share))
     face = np.concatenate(chosen)
-    corner = scene.corners
-    point = points_on(corner[face], np.arange(1, len(face) + 1))
+    corner = scene.corners[face]
+    point, normal = points_on(corner, np.arange(1, len(face) + 1)), normals(corner)
 
     def lit(samples: int, turn: Floats) -> Floats:
-        return Light(around, corner, samples, defaults.reach)(face, point, turn).astype(np.float64)
+        return light(around, point, normal, turn, samples, defaults.reach).astype(np.float64)
 
     truth, again = (lit(limit, random.random(len(face))) for _ in range(2))
     turn = random.random(len(face))

@@ -1,35 +1,39 @@
 """The experiment of baked light: what clients look up in lightmaps, beside the light at points.
 
-The reference is the light by far more rays at random points of the surfaces of a few cells, without
-texels and without smoothing. What is covered, as a wall by a picture, does not count: lightmaps
-have the light of the neighbours there.
+The reference is the light by far more rays, and of all lamps, at random points of the surfaces of a
+few cells, without texels, smoothing, codes and lossy images. What is covered, as a wall by a
+picture, does not count: lightmaps have the light of the neighbours there.
+
+The error is the mean of the relative differences of luminance: light spans many stops, of which the
+eye judges ratios. Light of less than `DIM` of the usual one counts as this: no client shows what is
+below. (The root mean square, linear or of logarithms, is that of the few points beside a lamp, or
+in the darkest corners.)
 """
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, areas
-from ptmtools.light.cells import ABOVE, COVERED, WHITE, CellLight, LightBaking, expose
-from ptmtools.light.lamps import lamps_of
+from ptmtools.light.cells import CellLight, LightBaking
 from ptmtools.light.looks import LightImage, lookup
-from ptmtools.light.mixing import light_mix
-from ptmtools.light.model import CellSurfaces
-from ptmtools.light.occlusion import Occluders
+from ptmtools.light.model import CellSurfaces, coded_light
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
 from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE
-from ptmtools.pipeline.stages.light import unlit_materials
+from ptmtools.pipeline.stages.light import light_baking, lossy_light, unlit_materials
 from ptmtools.pipeline.stages.scene import lights_of, scene_origin
+from ptmtools.scene.colors import luminance, to_linear
 from ptmtools_lab.tradeoff.experiment import (
     Experiment,
     Measurement,
     Setting,
     Subject,
-    decibels,
     time_work,
 )
 
@@ -37,6 +41,8 @@ from ptmtools_lab.tradeoff.experiment import (
 TRIED, POINTS = 4, 2_000
 #: Rays of the reference.
 MOST = 4_096
+#: The least light that counts, as a share of the usual one.
+DIM = 0.01
 
 
 def prepare_lightmaps(subject: Subject, limit: int = MOST) -> Experiment:
@@ -44,18 +50,17 @@ def prepare_lightmaps(subject: Subject, limit: int = MOST) -> Experiment:
     artifacts = subject.artifacts
     scene, lights = artifacts[SCENE], lights_of(artifacts)
     options = replace(subject.options(LIGHT), light="bake")
-    dark = unlit_materials(scene, lights, painted=False)
+    unlit = unlit_materials(scene, lights, painted=False)
     geometry, replaced = Geometry(scene, artifacts[CELLS]), scene_origin(artifacts).objects
 
     def pieces(density: float) -> list[CellSurfaces]:
-        return pieces_of(geometry, artifacts[CELLS], dark, 1 / density, replaced)
+        return pieces_of(geometry, artifacts[CELLS], unlit, 1 / density, replaced)
 
-    around, fine = Occluders.from_scene(scene), pieces(options.light_density)
-    mix = light_mix(around, fine, lamps_of(scene, lights), options, ABOVE, WHITE)
+    fine = pieces(options.light_density)
     lit = [n for n, piece in enumerate(fine) if not piece.glass.all()]
     chosen = np.unique(np.linspace(0, len(lit) - 1, min(TRIED, len(lit))).astype(int)).tolist()
-    cells = [lit[n] for n in chosen]
-    return lightmap_experiment(LightBaking(around, options, mix), pieces, cells, limit)
+    baking = light_baking(artifacts, options, None, lights, fine)
+    return lightmap_experiment(baking, pieces, [lit[n] for n in chosen], limit)
 
 
 def lightmap_experiment(
@@ -66,44 +71,52 @@ def lightmap_experiment(
 ) -> Experiment:
     """The experiment of the texels and rays of the lightmaps of some cells. ``pieces``: of all
     cells, for texels to the metre; ``limit``: rays of the reference."""
-    recorded, random = baking.options, np.random.default_rng(0)
-    exact = replace(baking, options=replace(recorded, light_samples=limit))
+    recorded, building = baking.options, baking.building
+    assert building is not None
+    least = DIM * building.usual
+    random = np.random.default_rng(0)
     places: list[tuple[Ints, Floats]] = []
-    truth, again = [], []
+    halves: list[Floats] = [np.zeros((2, 0))]
     for piece in (pieces(recorded.light_density)[cell] for cell in cells):
         corner = piece.corner.astype(np.float64)
         area = np.where(piece.glass, 0.0, areas(corner))
         face = random.choice(len(area), POINTS, p=area / area.sum())
         share = random.dirichlet((1, 1, 1), POINTS)
         point = np.einsum("nk,nkx->nx", share, corner[face])
-        look = exact.look(corner, exact.sides(corner, piece.side), piece.face)
-        first, second = (look(face, point, random.random(POINTS)) for _ in range(2))
-        open_to = first >= COVERED
-        places.append((face[open_to], share[open_to]))
-        truth.append(expose(first[open_to]))
-        again.append(expose(second[open_to]))
+        near = 0.5 / recorded.light_density
+        look = building.look(corner, baking.sides(corner, piece), limit // 2, near)
+        look = replace(look, lamps=building.lamps)
+        twice = np.stack([look(face, point, random.random(POINTS)) for _ in range(2)])
+        half = luminance(twice.astype(np.float64))
+        sound = ~np.isnan(half).any(axis=0)
+        places.append((face[sound], share[sound]))
+        halves.append(np.maximum(half[:, sound], least))
         replace(baking, options=replace(recorded, light_samples=1)).light(piece)  # compiles it
-    right = np.concatenate([np.zeros(0), *truth])
-    noise = 255 * (np.concatenate([np.zeros(0), *again]) - right)
+    first, second = np.concatenate(halves, axis=1)
+    truth = (first + second) / 2
 
     def measure(setting: Setting) -> Measurement:
         options = replace(recorded, **setting.knobs)
         chosen = [pieces(options.light_density)[cell] for cell in cells]
         with_options = replace(baking, options=options)
         made, seconds = time_work(lambda: [with_options.light(piece) for piece in chosen])
-        rows = zip(made, chosen, places, strict=True)
-        shown = np.concatenate([_shown_light(light, piece, *place) for light, piece, place in rows])
-        off = np.abs(255 * (shown - right))
-        error = float(np.sqrt(np.square(off).mean()))
+        images = [b"" if k.texels is None else lossy_light(k.texels)[1] for k in made]
+        rows = zip(made, images, chosen, places, strict=True)
+        shown = np.concatenate(
+            [_shown_light(light, image, piece, *place) for light, image, piece, place in rows]
+        )
+        off = np.abs(np.maximum(luminance(shown), least) / truth - 1)
         return Measurement(
             seconds=seconds,
-            work=float(sum(0 if k.texels is None else k.texels.size for k in made)),
-            error=error,
+            work=float(sum(map(len, images))),
+            error=float(off.mean()),
             worst=float(np.percentile(off, 95)),
-            more={"PSNR": decibels(error)},
+            more={
+                "texels": float(sum(0 if k.texels is None else k.texels[..., 0].size for k in made))
+            },
         )
 
-    values = {"density": (2.5, 5.0, 10.0, 20.0), "samples": (4, 16, 64, 256)}
+    values = {"density": (2.5, 5.0, 10.0, 20.0), "samples": (4, 8, 16, 32, 64, 256)}
     settings = [
         Setting(f"--light-{name} {value:g}", {f"light_{name}": value}, name)
         for name, some in values.items()
@@ -111,20 +124,32 @@ def lightmap_experiment(
         if name != "samples" or value < limit
     ]
     return Experiment(
-        f"texels of the lightmaps of {len(cells)} cells",
-        "RMS error of linear light, of 255",
+        f"bytes of the lightmaps of {len(cells)} cells",
+        "mean relative error of luminance",
         settings if cells else [],
         measure,
-        float(np.sqrt(np.square(noise).mean() / 2)) if cells else 0.0,
-        units={"PSNR": "dB"},
+        float(np.abs((first - second) / truth).mean() / 2) if cells else 0.0,
+        units={"work": "B"},
     )
 
 
-def _shown_light(light: CellLight, piece: CellSurfaces, face: Ints, share: Floats) -> Floats:
-    """(n,) the light, 0 to 1, that clients show at places of (n,) faces."""
-    at_vertices = np.einsum("nk,nk->n", share, light.vertex[face] / 255)
-    if light.texels is None:
+def _shown_light(
+    light: CellLight, image: bytes, piece: CellSurfaces, face: Ints, share: Floats
+) -> Floats:
+    """(n, 3) the light that clients show at places of (n,) faces."""
+    vertex = light.white * to_linear(light.vertex[face] / 255)
+    at_vertices = np.einsum("nk,nkc->nc", share, vertex)
+    if not image:
         return np.asarray(at_vertices)
     at = np.einsum("nk,nkx->nx", share, light.uv[face].astype(np.float64))
-    mapped = lookup(LightImage(light.texels, ("clamp", "clamp")), at)
-    return np.where(piece.dense[face], at_vertices, mapped)
+    codes = [lookup(LightImage(channel, ("clamp", "clamp")), at) for channel in _channels(image)]
+    mapped = coded_light(255 * np.stack(codes, axis=1).astype(np.float64), light.white)
+    return np.where(piece.dense[face, None], at_vertices, mapped)
+
+
+def _channels(image: bytes) -> NDArray[np.uint8]:
+    """(3, h, w) the codes of the image of a lightmap."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(image)) as opened:
+        return np.moveaxis(np.asarray(opened.convert("RGB")), 2, 0).copy()

@@ -103,44 +103,44 @@ def lightmap_stem(cell: int) -> str:
 _NO_LIGHT = {"lightmaps": 0, "light": "none"}
 
 
-def _baking(
-    run: Run,
+def light_baking(
+    artifacts: Artifacts,
     options: LightOptions,
     model_light: Lights | None,
     lights: Lights | None,
     pieces: list[CellSurfaces],
 ) -> LightBaking:
-    """What the tasks share: the light of the model, or that of the building."""
+    """What the tasks share: the light of the model, if it is given, or that of the building."""
     import numpy as np
 
     from ptmtools.light.building import BuildingBaking
     from ptmtools.light.cells import LightBaking
     from ptmtools.scene.colors import luminance
 
-    albedo = _reflectance(run)
+    albedo = _reflectance(artifacts)
     grey = luminance(albedo).astype(np.float32)
     if model_light:
-        return LightBaking(options, None, _paint(run, model_light), grey)
-    building = BuildingBaking(run[SCENE], pieces, lights, albedo).light()
+        return LightBaking(options, None, _paint(artifacts, model_light), grey)
+    building = BuildingBaking(artifacts[SCENE], pieces, lights, albedo).light()
     return LightBaking(options, building, None, grey)
 
 
-def _reflectance(run: Run) -> NDArray[np.float64]:
+def _reflectance(artifacts: Artifacts) -> NDArray[np.float64]:
     """(T, 3) the mean colour of each face of the scene, linear light."""
     import numpy as np
 
     from ptmtools.scene.colors import to_linear
 
     def read(name: str) -> bytes:
-        return run.db.read_output(TEXTURES.name, name)
+        return artifacts.db.read_output(TEXTURES.name, name)
 
     def source(name: str) -> PtmSource:
-        return run.db.source(name, run.db.output(TEXTURES.name, name))
+        return artifacts.db.source(name, artifacts.db.output(TEXTURES.name, name))
 
-    scene = run[SCENE]
+    scene = artifacts[SCENE]
     means = []
-    for name in texture_files(image_digests(run)):
-        steps = stored_texture(run, name, source, read).steps
+    for name in texture_files(image_digests(artifacts)):
+        steps = stored_texture(artifacts, name, source, read).steps
         mean = np.array(steps.detail.color) / 255
         # The mean of light is more than the light of the mean, by the second derivative.
         spread = (steps.errors[0] / 255) ** 2
@@ -180,19 +180,19 @@ def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> ND
     return dark | (lights.map < 0 if painted else lamp_radiance(scene, lights).any(axis=1))
 
 
-def _paint(run: Run, lights: Lights) -> PaintedLight:
+def _paint(artifacts: Artifacts, lights: Lights) -> PaintedLight:
     """The lightmaps of the model, for the faces of the scene with replaced objects."""
     import numpy as np
 
     from ptmtools.light.looks import LightImage, PaintedLight, red_texels
 
-    scene = run.original(SCENE)
+    scene = artifacts.original(SCENE)
     files = {lightmap.data for lightmap in lights.maps}
     decoded = {data: red_texels(data, _MOST, "lightmap") for data in files}
     images = tuple(LightImage(decoded[k.data], k.wrap, k.strength) for k in lights.maps)
     image = lights.map[scene.triangle_material]
     uv = lights.uv.astype(np.float64)
-    return PaintedLight(scene.corners, uv, image, images, scene_origin(run).triangle)
+    return PaintedLight(scene.corners, uv, image, images, scene_origin(artifacts).triangle)
 
 
 def _kind_of_light(baking: LightBaking) -> Mapping[str, Any]:
@@ -323,7 +323,7 @@ class LightStage(Stage["Light"]):
             remedy = f"{fault.remedy}, then build again" if fault.remedy else "build again"
             work = replace(work, inputs={**work.inputs, _ABSENT: ""})
             return complete(work, _NO_LIGHT, (Warned(f"{left_out}; {remedy}"),))
-        baking = _baking(run, options, model_light, lights, pieces)
+        baking = light_baking(run, options, model_light, lights, pieces)
         shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
         cell_lights, total = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
