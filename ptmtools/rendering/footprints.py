@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints, cross
+from ptmtools.arrays import Floats, Ints, cross
 from ptmtools.rendering.records import Sight, Triangles
 
 #: Takes the place of 0 for the component of a ray along the normal of a plane seen edge-on.
@@ -40,7 +40,8 @@ def show_colors(
     triangles, ``vertex_colors`` (T, 3, 3), instead of the means of these."""
     if vertex_colors is None:
         return
-    pixel = np.flatnonzero((sight.triangle >= 0) & _uneven(vertex_colors)[sight.triangle])
+    uneven = (vertex_colors != vertex_colors[:, :1]).any(axis=(1, 2))
+    pixel = np.flatnonzero((sight.triangle >= 0) & uneven[sight.triangle])
     mean = vertex_colors[sight.triangle[pixel]].mean(axis=1)
     interpolated = _interpolate(sight, pixel, triangles, vertex_colors)
     shown[pixel] *= np.divide(interpolated, mean, out=np.zeros_like(interpolated), where=mean > 0)
@@ -49,16 +50,10 @@ def show_colors(
 def corner_values(sight: Sight, pixel: Ints, triangles: Triangles, values: Floats) -> Floats:
     """(n, 3) between the ``values`` (T, 3, 3) of the corners of the triangles that some pixels
     show."""
-    triangle = sight.triangle[pixel]
-    result: Floats = values[triangle, 0]
-    rows = np.flatnonzero(_uneven(values)[triangle])
+    shown = values[sight.triangle[pixel]]
+    result: Floats = shown[:, 0]
+    rows = np.flatnonzero((shown != shown[:, :1]).any(axis=(1, 2)))
     result[rows] = _interpolate(sight, pixel[rows], triangles, values)
-    return result
-
-
-def _uneven(values: Floats) -> Bools:
-    """(T,) which triangles have several of the (T, 3, 3) values at their corners."""
-    result: Bools = (values != values[:, :1]).any(axis=(1, 2))
     return result
 
 

@@ -36,6 +36,9 @@ SHOULDER, FADING = 0.8, 0.15
 #: Sine of the angle to the horizon at which the background is all sky, or all ground below it.
 HORIZON = 0.02
 
+#: Pixels that are lit at a time, for little memory.
+_BLOCK = 1 << 16
+
 #: (n, 3) of the pixels of a sight in lightmaps, the textures of triangles, 0 to 255; 255 without.
 Codes = Callable[[Sight, Triangles], Floats]
 
@@ -147,7 +150,9 @@ class LitSurfaces:
         lit = self._white[sight.triangle[hit]] > 0
         self._show_plain(sight, hit[~lit], GLOW if tone is None else LIT_GLOW, shown)
         if tone:
-            self._show_light(sight, hit[lit], tone, codes, shown)
+            pixel = hit[lit]
+            for begin in range(0, len(pixel), _BLOCK):
+                self._show_light(sight, pixel[begin : begin + _BLOCK], tone, codes, shown)
         show_colors(sight, self.triangles, self._vertex_colors, shown)
         outside = np.flatnonzero(sight.triangle < 0)
         shown[outside] = tone.background_colors(sight.ray[outside]) if tone else SKY
