@@ -79,11 +79,11 @@ def make_museum(folder: Path, rooms: int = 1, textures: int = 9, size: int = 64)
 
 @pytest.fixture(scope="session")
 def gltf_museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The database of the smallest museum; not to be changed."""
+    """The database of the smallest museum, without light; not to be changed."""
 
     def build(folder: Path) -> None:
         words = ["build-scene", str(make_museum(folder / "model")), "-o", str(folder / "db")]
-        assert main(["-q", *words, "-j", "1"]) == 0
+        assert main(["-q", *words, "-j", "1", "--light", "none"]) == 0
 
     return once(tmp_path_factory, "gltf_museum", build) / "db"
 

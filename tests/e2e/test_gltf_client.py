@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import shutil
@@ -22,7 +23,9 @@ from render import Look, View, load, render  # noqa: E402
 from ptmtools.cli.main import main  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
+from ptmtools.site.content import SiteOptions, site_of  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
+from tests.site.strips import EXPOSURE, EYES, lit_site, view_of  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 #: What MeshBasicMaterial shows before a background of nothing.
@@ -33,10 +36,11 @@ LIKE = 30.0
 
 @pytest.fixture(scope="module")
 def rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What is served of a museum in which not every cell sees all the others."""
+    """What is served of a museum without light in which not every cell sees all the others."""
     folder = tmp_path_factory.mktemp("rooms")
     model = make_museum(folder / "model", rooms=3)
-    assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
+    build = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]
+    assert main([*build, "--light", "none"]) == 0
     return folder / "db" / "www"
 
 
@@ -270,23 +274,93 @@ def test_three_js_shows_objects_as_modelled(
     assert walked.left["bytes"] == walked.left["geometries"] == 0
 
 
-def test_three_js_shows_lightmaps(three: Any, tmp_path: Path) -> None:
-    """As `ptm render` draws them, which also shades surfaces without texture."""
+@pytest.fixture(scope="module")
+def lit_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Databases of two rooms, ``lit`` with light at half of its exposure, and ``plain``."""
     pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
-    model = write_rooms(tmp_path / "model", 3)
+    folder = tmp_path_factory.mktemp("lit")
+    model = write_rooms(folder / "model", 3)
     build = ["-q", "build-scene", str(model), "-j", "1", "--backend", "embree"]
+    for name, light in (("lit", "bake"), ("plain", "none")):
+        assert main([*build, "-o", str(folder / name), "--light", light]) == 0
+    hints = folder / "lit/www/hints.json"
+    index = json.loads(hints.read_text())
+    for cell in index["cells"]:
+        cell["exposure"] = 0.5
+    hints.write_text(json.dumps(index))
+    return folder
+
+
+def test_three_js_shows_lightmaps(three: Any, lit_rooms: Path) -> None:
+    """As `ptm render` draws them."""
     width, height = 320, 240
-    for name, more in (("lit", ["--light", "bake"]), ("plain", [])):
-        assert main([*build, "-o", str(tmp_path / name), *more]) == 0
-    walked = three.walk(tmp_path / "lit/www", width=width, height=height)
+    walked = three.walk(lit_rooms / "lit/www", width=width, height=height)
     assert walked.messages == ()
     assert any("light~" in file for file in walked.files)
     with Image.open(io.BytesIO(walked.png)) as image:
         shown = np.asarray(image.convert("RGB")).astype(float)
     lit, plain = (
-        draw_view(read_served(tmp_path / name), ViewOptions(width=width, height=height))
+        draw_view(read_served(lit_rooms / name), ViewOptions(width=width, height=height))
         for name in ("lit", "plain")
     )
     error = [((shown - each.astype(float)) ** 2).mean() for each in (lit, plain)]
     assert 10 * np.log10(255**2 / error[0]) > LIKE - 3
     assert error[1] > 3 * error[0]
+
+
+STRIPS = """
+const walk = await Walk.open(renderer, "/www/hints.json");
+const camera = new THREE.PerspectiveCamera(
+  THREE.MathUtils.radToDeg(settings.angle), settings.width / settings.height, 0.05, 1000);
+const scene = new THREE.Scene().add(walk.shown);
+if (walk.surroundings) scene.add(walk.surroundings);
+const pictures = [];
+for (const [cell, eye] of settings.eyes.entries()) {
+  camera.position.set(...eye);
+  await walk.enter(cell);
+  renderer.render(scene, camera);
+  pictures.push([renderer.domElement.toDataURL("image/png"), walk.exposure]);
+}
+// Through the door, and back by a jump.
+const exposures = [];
+for (const [x, pause] of [[0.2, 0], [0, 0], [0, 60], [0, 1200], [3, 0]]) {
+  await new Promise((resolve) => setTimeout(resolve, pause));
+  await walk.update(new THREE.Vector3(x, 1.5, 0));
+  exposures.push(walk.exposure);
+}
+walk.dispose();
+return { pictures, exposures };
+"""
+
+
+@pytest.mark.parametrize("tone", ["neutral", "plain"])
+def test_three_js_follows_the_formula_of_light(
+    three: Any, lit_rooms: Path, tmp_path: Path, tone: str
+) -> None:
+    """Of lightmaps, of light at vertices, under a normal map, and around."""
+    site = lit_site(
+        site_of(lit_rooms / "plain", SiteOptions(pictures=False, opening=False)),
+        lambda index: index["light"].update(tone=tone),
+    )
+    for name, entry in site.entries.items():
+        if name.startswith("data/"):
+            path = "hints.json" if "/index-" in name else name.removeprefix("data/")
+            (tmp_path / path).write_bytes(entry.read())
+    width, height = 320, 240
+    angle = site.index["viewpoints"][0]["fieldOfView"]
+    settings = {"width": width, "height": height, "angle": angle, "eyes": EYES}
+    answer, visit = three.run(STRIPS, {"www": tmp_path}, **settings)
+    assert visit.messages == []
+    for eye, (png, exposed), expected in zip(EYES, answer["pictures"], EXPOSURE, strict=True):
+        assert exposed == expected
+        with Image.open(io.BytesIO(base64.b64decode(png.partition(",")[2]))) as image:
+            shown = np.asarray(image.convert("RGB")).astype(float)
+        wanted, parts = view_of(eye, angle, (width, height), expected, tone)
+        apart = np.abs(shown - wanted).max(axis=2)
+        unlike = {name for name, part in parts.items() if apart[part].max() > 3}
+        # It does not shade unlit surfaces by their angle, nor choose a background without sky.
+        assert unlike == {"unlit"} | ({"around"} if tone == "plain" else set())
+    less, more = EXPOSURE
+    before, *_, soon, late, after = answer["exposures"]
+    assert (before, late, after) == (more, less, more)
+    assert less <= soon < more

@@ -64,7 +64,7 @@ def lit_site(
         document["textures"].append(row_of(f"{name}.ptm", image, data))
     document["textures"][first + 1]["light"] = 0
     document["textures"][first + 2]["normals"] = True
-    del document["meshes"]
+    document.pop("meshes", None)
     for cell, exposure in zip(document["cells"], EXPOSURE, strict=True):
         cell["exposure"] = exposure
     document["light"] = dict(LIGHT)
@@ -81,9 +81,18 @@ def lit_site(
     for cell, data in zip(document["cells"], geometry, strict=True):
         name = f"data/{cell['geometry']}"
         entries[name] = replace(entries[name], source=data, state=None, digest="")
-    text = json.dumps(document).encode()
-    entries[place] = replace(entries[place], source=text, state=None, digest="")
+        name = f"data/{cell['record']}"
+        record = json.loads(entries[name].read())
+        for textures in record["textures"]:
+            textures += [first, first + 1]
+        entries[name] = changed(entries[name], record)
+    entries[place] = changed(entries[place], document)
     return Site(entries, document)
+
+
+def changed(entry: SiteEntry, document: Mapping[str, Any]) -> SiteEntry:
+    """An entry with another document."""
+    return replace(entry, source=json.dumps(document).encode(), state=None, digest="")
 
 
 def row_of(file: str, image: NDArray[np.uint8], data: bytes) -> dict[str, Any]:
@@ -104,7 +113,8 @@ def factor(color: tuple[float, float, float]) -> dict[str, Any]:
 
 def glb(cell: int, materials: Mapping[str, Mapping[str, Any]]) -> bytes:
     """A strip of each material."""
-    tree: dict[str, Any] = {"asset": {"version": "2.0"}, "scenes": [{"extras": {"cell": cell}}]}
+    scene = {"extras": {"cell": cell}, "nodes": list(range(len(materials)))}
+    tree: dict[str, Any] = {"asset": {"version": "2.0"}, "scenes": [scene], "scene": 0}
     tree |= {"nodes": [], "meshes": [], "materials": [], "accessors": [], "bufferViews": []}
     binary = bytearray()
 
@@ -112,7 +122,10 @@ def glb(cell: int, materials: Mapping[str, Mapping[str, Any]]) -> bytes:
         view = {"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes}
         tree["bufferViews"].append(view)
         number = {"float32": 5126, "uint16": 5123}[array.dtype.name]
-        row = {"componentType": number, "count": len(array), "type": kind}
+        row: dict[str, Any] = {"componentType": number, "count": len(array), "type": kind}
+        row["normalized"] = kind == "VEC4"
+        if kind != "SCALAR":
+            row |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
         tree["accessors"].append({"bufferView": len(tree["accessors"]), **row})
         binary.extend(array.tobytes())
         binary.extend(bytes(-len(binary) % 4))
@@ -133,7 +146,7 @@ def glb(cell: int, materials: Mapping[str, Mapping[str, Any]]) -> bytes:
         tree["meshes"].append({"primitives": [primitive]})
         tree["nodes"].append({"mesh": number})
         tree["materials"].append(material)
-    return pack(tree, bytes(binary))
+    return pack(tree | {"buffers": [{"byteLength": len(binary)}]}, bytes(binary))
 
 
 def developed(light: Floats, tone: str) -> Floats:

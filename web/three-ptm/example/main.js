@@ -33,6 +33,7 @@ async function show(index, mebibytes) {
   camera.position.set(...view.position);
   camera.lookAt(camera.position.clone().add(new Vector3(...view.direction)));
   const scene = new Scene().add(walk.shown);
+  if (walk.surroundings) scene.add(walk.surroundings);
 
   const fit = () => {
     renderer.setPixelRatio(devicePixelRatio);

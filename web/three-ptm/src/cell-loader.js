@@ -1,10 +1,11 @@
-// Cells from their GLBs, as docs/formats/gltf.md describes them: in unlit materials, with the textures
-// and lightmaps of this adapter. Only what has a normal map is lit by a lamp.
+// Cells from their GLBs, as docs/formats/gltf.md describes them: with the textures and the light of this
+// adapter, or unlit. Only what has a normal map is lit by a lamp.
 
 import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 import { loadViewDecoder } from "ptm-decoder";
+import { illuminate } from "./light.js";
 import { bump, relieve } from "./relief.js";
 
 /** @typedef {import("three").Group} Group */
@@ -14,7 +15,12 @@ import { bump, relieve } from "./relief.js";
  * @typedef {(texture: number, wrapS: number, wrapT: number, beside?: number) => Texture} TextureOf
  */
 
+/** @typedef {import("./light.js").Light} Light */
+/** @typedef {import("./light.js").Exposure} Exposure */
+
 const CLAMP = 33071;
+/** The light of buildings, as builds write it. @type {Light} */
+const LIGHT = { stops: 10, tone: "neutral" };
 
 /** @type {Promise<import("ptm-decoder").ViewDecoder> | undefined} */
 let decoder;
@@ -37,17 +43,29 @@ const meshoptDecoder = {
   },
 };
 
+/** Loads no images: the plug-ins with these names take the place of its own. */
+function loaderOfGeometry() {
+  const loader = new GLTFLoader().setMeshoptDecoder(meshoptDecoder), loadTexture = async () => new Texture();
+  for (const name of ["EXT_texture_webp", "EXT_texture_avif"]) loader.register(() => ({ name, loadTexture }));
+  return loader;
+}
+
 /** Loads cells whose surfaces show the textures of `textureOf`. */
 export class CellLoader {
   #textureOf;
-  // Prevents the loader from fetching images.
-  #loader = new GLTFLoader().setMeshoptDecoder(meshoptDecoder).register(() => {
-    return { name: "none", loadTexture: async () => new Texture() };
-  });
+  #light;
+  #exposure;
+  #loader = loaderOfGeometry();
 
-  /** @param {TextureOf} textureOf */
-  constructor(textureOf) {
+  /**
+   * @param {TextureOf} textureOf
+   * @param {Light} [light] of the index
+   * @param {Exposure} [exposure] that lit surfaces share
+   */
+  constructor(textureOf, light = LIGHT, exposure = { value: 1 }) {
     this.#textureOf = textureOf;
+    this.#light = light;
+    this.#exposure = exposure;
   }
 
   /**
@@ -75,13 +93,13 @@ export class CellLoader {
 
   /** @param {import("three").Material} material the loader's, with the extras as `userData` */
   #look({ color, opacity, transparent, alphaTest, vertexColors, side, userData }) {
-    const { texture, wrapS, wrapT, mesh, light, normal } = userData;
+    const { texture, wrapS, wrapT, mesh, light, white, normal } = userData;
     const wrap = (/** @type {number | undefined} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
-    const aoMap = light === undefined ? null : this.#textureOf(light, ClampToEdgeWrapping, ClampToEdgeWrapping);
+    const lightMap = light === undefined ? null : this.#textureOf(light, ClampToEdgeWrapping, ClampToEdgeWrapping);
     const depthWrite = !transparent;
     const drawn = { opacity, transparent, alphaTest, vertexColors, side, depthWrite };
-    const look = Object.assign(new MeshBasicMaterial({ color, map, aoMap, ...drawn }), { userData: { mesh } });
+    const look = Object.assign(new MeshBasicMaterial({ color, map, lightMap, ...drawn }), { userData: { mesh } });
     const { normalCoords, normalScale = 1, normalWrapS, normalWrapT } = userData;
     if (normal !== undefined && normalCoords !== undefined) {
       const relief = this.#textureOf(normal, wrap(normalWrapS), wrap(normalWrapT), texture ?? -1);
@@ -89,6 +107,7 @@ export class CellLoader {
     } else if (normal !== undefined) {
       relieve(look, this.#textureOf(normal, ClampToEdgeWrapping, ClampToEdgeWrapping));
     }
+    if (white) illuminate(look, white, this.#light, this.#exposure);
     return look;
   }
 }

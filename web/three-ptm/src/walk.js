@@ -6,6 +6,7 @@ import { Locator, levelSizes } from "ptm-client";
 import { DecoderWorkers } from "ptm-decoder";
 import { shareOut } from "./budget.js";
 import { CellLoader, disposeCell, disposeMesh } from "./cell-loader.js";
+import { ease, surroundingsOf } from "./light.js";
 import { PtmTexture } from "./ptm-texture.js";
 import { RangeFile } from "./range-file.js";
 
@@ -22,7 +23,8 @@ import { RangeFile } from "./range-file.js";
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
  *   height: number, bytes: number, exact?: boolean}[], light?: number, relief?: string,
  *   normals?: boolean}[]} textures
- * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
+ * @property {{name: string, box: number[], record?: string, geometry?: string, exposure?: number}[]} cells
+ * @property {import("./light.js").Light} [light]
  * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
  */
 
@@ -57,6 +59,8 @@ import { RangeFile } from "./range-file.js";
 const NORMALS = 0.25, PLAIN_SHARE = 0.01;
 /** Texels of a side to which all textures are refined before any is refined further. */
 const FIRST_LOOK = 64;
+/** Metres between two calls of `update` that are a jump. */
+const JUMP = 1;
 
 /** Shows the cells visible from a cell and frees the others: see `update` and `enter`. */
 export class Walk {
@@ -70,7 +74,12 @@ export class Walk {
   #url;
   #options;
   #ownWorkers;
-  #loader = new CellLoader((...which) => this.#texture(...which));
+  #loader;
+  /** That of lit surfaces; where the viewer was, and when, ms; and whether by a jump to an unknown cell. */
+  #exposure = { value: 1 };
+  #place = [Infinity];
+  #before = 0;
+  #jumped = true;
   #locator;
   /** @type {Map<number, Promise<CellRecord>>} */
   #records = new Map();
@@ -106,11 +115,24 @@ export class Walk {
     if (index.schema !== 2) throw new Error(`hints of schema ${index.schema}, not 2`);
     this.index = index;
     this.budget = options.budget ?? 2 ** 28;
+    /** Sky and ground of a building with light, to be added to a scene; or null. */
+    this.surroundings = index.light ? surroundingsOf(index.light, this.#exposure) : null;
+    this.#loader = new CellLoader((...which) => this.#texture(...which), index.light, this.#exposure);
     this.#locator = new Locator(index.cells.map(({ box }) => box));
     this.#renderer = renderer;
     this.#url = new URL(url, globalThis.document?.baseURI);
     this.#options = options;
     this.#ownWorkers = options.workers ? undefined : new DecoderWorkers();
+  }
+
+  /** Factor of all light in the picture. */
+  get exposure() {
+    return this.#exposure.value;
+  }
+
+  /** The exposure of the viewer's cell; of an eye in none, as it is. */
+  get #target() {
+    return this.cell < 0 ? this.exposure : (this.index.cells[this.cell].exposure ?? 1);
   }
 
   /** Bytes of all textures on the GPU. */
@@ -126,19 +148,28 @@ export class Walk {
   }
 
   /**
-   * To be called in each frame: enters the cell that holds the viewer, with those beyond near door
-   * leaves, if they have changed.
+   * To be called in each frame: eases the exposure to that of the viewer's cell, and enters the cell that
+   * holds the viewer, with those beyond near door leaves, if they have changed.
    * @param {Vector3} position
    */
   async update(position) {
+    const place = position.toArray(), now = performance.now();
+    this.#jumped ||= !(Math.hypot(...place.map((x, k) => x - this.#place[k])) < JUMP);
+    ease(this.#exposure, this.#target, (now - this.#before) / 1000);
+    [this.#place, this.#before] = [place, now];
     if (this.#locating) return;
     this.#locating = true;
+    const jumped = this.#jumped;
+    this.#jumped = false;
     const cell = await this.locate(position)
       .catch((error) => (this.#report(error), -1))
       .finally(() => (this.#locating = false));
+    this.#jumped ||= jumped && cell < 0;
     if (cell < 0) return;
     const around = this.#locator.around(position.toArray(), cell);
-    if (around.join() !== this.#around.join()) await this.#enter(around);
+    const entered = around.join() === this.#around.join() ? null : this.#enter(around);
+    if (jumped) this.#exposure.value = this.#target;
+    await entered;
   }
 
   /**
@@ -165,7 +196,9 @@ export class Walk {
    */
   async enter(cell, budget = this.budget) {
     this.budget = budget;
-    return this.#enter([cell]);
+    const entered = this.#enter([cell]);
+    this.#exposure.value = this.#target;
+    return entered;
   }
 
   /** @param {number[]} around the viewer's cell, then those beyond near passages */
@@ -211,6 +244,8 @@ export class Walk {
   dispose() {
     this.#entered.abort();
     this.#free(new Set(), new Map());
+    this.surroundings?.geometry.dispose();
+    this.surroundings?.material.dispose();
     this.#ownWorkers?.close();
   }
 

@@ -61,12 +61,14 @@ export class Material {
   alphaTest: number;
   vertexColors: boolean;
   side: number;
+  toneMapped: boolean;
   userData: {
     texture?: number;
     wrapS?: number;
     wrapT?: number;
     mesh?: number;
     light?: number;
+    white?: number;
     normal?: number;
     normalCoords?: number;
     normalScale?: number;
@@ -85,7 +87,7 @@ export class MeshBasicMaterial extends Material {
     side?: number;
     depthWrite?: boolean;
     map?: Texture | null;
-    aoMap?: Texture | null;
+    lightMap?: Texture | null;
   });
   customProgramCacheKey: () => string;
   onBeforeCompile: (shader: {
@@ -106,8 +108,25 @@ export class Object3D {
 }
 export class Group extends Object3D {}
 export class Scene extends Object3D {}
+export class BufferAttribute {
+  constructor(numbers: Float32Array, size: number);
+}
+export class BufferGeometry {
+  setAttribute(name: string, attribute: BufferAttribute): this;
+  dispose(): void;
+}
+export class ShaderMaterial extends Material {
+  constructor(look: {
+    uniforms: Record<string, { value: unknown }>;
+    vertexShader: string;
+    fragmentShader: string;
+    depthWrite?: boolean;
+    toneMapped?: boolean;
+  });
+}
 export class Mesh extends Object3D {
-  geometry: { dispose(): void };
+  constructor(geometry: BufferGeometry, material: Material);
+  geometry: BufferGeometry;
   material: Material;
 }
 export class PerspectiveCamera extends Object3D {
