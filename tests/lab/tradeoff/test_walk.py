@@ -15,6 +15,7 @@ from PIL import Image
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError, LimitError
+from ptmtools.light.options import LightOptions
 from ptmtools.output import EmitOptions
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.artifacts import Artifacts
@@ -64,13 +65,13 @@ TWO_ROOMS = Path(__file__).resolve().parents[3] / "sample_data/two_rooms/two_roo
 
 @pytest.fixture(scope="module")
 def db(tmp_path_factory) -> Path:
-    """The two rooms, with noise on the walls, which no codec keeps for nothing."""
+    """The two rooms, with noise on the walls, which no codec keeps for nothing, and no light."""
     folder = tmp_path_factory.mktemp("walk")
     shutil.copytree(TWO_ROOMS.parent, folder / "model")
     random = np.random.default_rng(0)
     for image in sorted((folder / "model").glob("*.png")):
         Image.fromarray(random.integers(0, 256, (64, 64, 3), np.uint8)).save(image)
-    options = AchOptions(preset="fast", backend="embree"), EmitOptions()
+    options = AchOptions(preset="fast", backend="embree"), EmitOptions(), LightOptions("none")
     build_scene(folder / "model" / TWO_ROOMS.name, folder / "rooms.db", *options, workers=1)
     return folder / "rooms.db"
 
@@ -201,7 +202,8 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
     assert (small.own, small.options.profile) == ("--profile fast", "small")
     quick = list(settings(own, 1024, quick=True))
     assert len({each.knob.option for each in quick}) == len(quick) <= len(KNOBS)
-    assert [s.name for s in concerned_stages(TEXTURES, own)] == [
+    lit = {**own, LIGHT: LightOptions()}
+    assert [s.name for s in concerned_stages(TEXTURES, lit)] == [
         "textures",
         "relief",
         "light",
@@ -291,7 +293,7 @@ def test_a_stage_runs_again_where_it_is_current(db) -> None:
 
 
 def test_all_later_stages_are_built_again(two_rooms) -> None:
-    """Also the light, whose stage decided to store nothing."""
+    """Also the light, whose stage is to store nothing and has nothing to set then."""
     artifacts = Artifacts(open_database(two_rooms))
     assert not artifacts.is_stored(LIGHT)
     own = own_options(artifacts)
@@ -299,7 +301,7 @@ def test_all_later_stages_are_built_again(two_rooms) -> None:
         name for name in artifacts.db.manifest.stages if not STAGES[name].joined
     }
     chosen = list(settings(own, 64))
-    assert {setting.knob for setting in chosen} == {*KNOBS}
+    assert {setting.knob for setting in chosen} == {k for k in KNOBS if k.stage != LIGHT}
     for setting in chosen:
         again = concerned_stages(setting.knob.stage, own)
         for stage, options in own.items():
