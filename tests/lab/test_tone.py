@@ -37,9 +37,10 @@ PLAIN = {"stops": STOPS, "tone": "plain"}
 #: Texel of the image, of 255, and its linear factor; codes of the two texels of the lightmap.
 TEXEL, FACTOR = (200, 90, 30), (0.9, 0.5, 0.7)
 CODES = ((250, 240, 200), (120, 180, 255))
-#: Linear colours of the corners of strip 1, with light as a share of white, and factor of strip 2.
+#: Linear colours of the corners of strip 1, with light as a share of white, and factors of strips
+#: 1 and 2.
 CORNERS = ((0.9, 0.5, 0.1), (0.2, 0.3, 0.6), (0.05, 0.02, 0.0))
-DULL = (0.4, 0.2, 0.6)
+TINT, DULL = (0.8, 0.6, 0.9), (0.4, 0.2, 0.6)
 WHITE = (3.0, 2.0)
 FAR, CAMERA = 4.0, RayCamera(48, 24, 1.2, 2.0)
 AHEAD = np.array([0.0, 0.0, -1.0])
@@ -96,7 +97,7 @@ def strips(light: Mapping[str, Any] | None = NEUTRAL, exposure: float = 1.0) -> 
     lit, strip = light is not None, np.repeat([0, 1, 2], 2)
     colors = np.ones((6, 3, 3))
     colors[2:4] = [[[encoded(value) for value in corner] for corner in CORNERS]] * 2
-    factor = np.array([[encoded(value) for value in row] for row in (FACTOR, (1, 1, 1), DULL)])
+    factor = np.array([[encoded(value) for value in row] for row in (FACTOR, TINT, DULL)])
     surfaces = Surfaces(
         corner=np.array(corner, np.float64),
         uv=np.zeros((6, 3, 2)),
@@ -160,7 +161,8 @@ def _expected(ray: list[float], tone: str | None, toned: bool, exposure: float) 
         color = [
             sum(w * c for w, c in zip(weight, k, strict=True)) for k in zip(*CORNERS, strict=True)
         ]
-        return displayed([WHITE[1] * value for value in color], exposure, toned)
+        base = [f * value for f, value in zip(TINT, color, strict=True)]
+        return displayed([WHITE[1] * value for value in base], exposure, toned)
     glow = LIT_GLOW if tone else GLOW
     shade = glow + (1 - glow) / math.hypot(*ray)
     if strip == 2:
@@ -169,7 +171,7 @@ def _expected(ray: list[float], tone: str | None, toned: bool, exposure: float) 
         sum(w * encoded(c) for w, c in zip(weight, k, strict=True))
         for k in zip(*CORNERS, strict=True)
     ]
-    return [255 * shade * value for value in colors]
+    return [255 * shade * encoded(f) * v for f, v in zip(TINT, colors, strict=True)]
 
 
 def _outside(ray: list[float], exposure: float) -> list[float]:
@@ -300,19 +302,23 @@ def test_brighter_light_is_never_darker() -> None:
     np.testing.assert_allclose(shown[-1], 255, atol=2)
 
 
+def encoded_tint() -> Floats:
+    return np.array([encoded(value) for value in TINT])
+
+
 def test_light_at_vertices_for_pictures_that_compute_none() -> None:
     """Its colours are those displayed on white; without any, that of all of it."""
     served = strips(NEUTRAL)
     for colors in (served.surfaces.vertex_colors, None):
         lit = replace(served.surfaces, vertex_colors=colors)
         if colors is None:
-            lit = replace(lit, color=np.ones((6, 3)))
+            lit = replace(lit, color=np.tile(encoded_tint(), (6, 1)))
         shown = show_vertex_light(replace(served, surfaces=lit)).surfaces
         light = CORNERS if colors is not None else np.ones((3, 3))
         expected = [displayed([WHITE[1] * v for v in corner], 1.0, True) for corner in light]
         assert shown.white is None
         assert shown.vertex_colors is not None
         np.testing.assert_allclose(255 * shown.vertex_colors[2], expected)
-        np.testing.assert_allclose(255 * shown.color[2], np.mean(expected, axis=0))
+        np.testing.assert_allclose(255 * shown.color[2], encoded_tint() * np.mean(expected, axis=0))
         np.testing.assert_array_equal(shown.color[[0, 4]], lit.color[[0, 4]])
         np.testing.assert_array_equal(shown.vertex_colors[[0, 4]], 1)
