@@ -194,7 +194,8 @@ def _plan(
     before = artifacts.before(stage)
     anew = [read.name for read in stage.sources(options) if read in changing]
     if stage.opens_inputs and anew:
-        inputs = dict(before.inputs) if before else {}
+        recorded, choices = before.inputs if before else {}, artifacts.choices(stage)
+        inputs = {name: choices.get(name, digest) for name, digest in recorded.items()}
     else:
         inputs = stage.inputs(artifacts, options)
     work = stage.work(options, inputs)

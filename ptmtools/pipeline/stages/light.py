@@ -30,7 +30,7 @@ from ptmtools.pipeline.stages.scene import (
 )
 from ptmtools.pipeline.stages.textures import TEXTURES, stored_texture, texture_files
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import LIGHTS, arrays_of, sha256
+from ptmtools.store.layout import LIGHTS, SERVED, arrays_of, sha256
 
 if TYPE_CHECKING:
     import numpy as np
@@ -68,15 +68,16 @@ class LitCells:
 
 def bake_cell(
     shared: LitCells, task: tuple[int, CellSurfaces]
-) -> tuple[CellLight, list[tuple[str, bytes]]]:
-    """The light of a cell, and the files of its lightmap as `encode_image` returns them; none
-    without one."""
+) -> tuple[tuple[CellLight, int], list[tuple[str, bytes]]]:
+    """The light of a cell, with the bytes of its lightmap that are served, and the files of it as
+    `encode_image` returns them; none without one."""
     cell, piece = task
     light = shared.baking.light(piece)
     if light.texels is None:
-        return light, []
+        return (light, 0), []
     name, data = lossy_light(light.texels)
-    return light, encode_image(shared.options, f"{lightmap_stem(cell)}.{name}", data)
+    files = encode_image(shared.options, f"{lightmap_stem(cell)}.{name}", data)
+    return (light, sum(len(part) for file, part in files if file.startswith(f"{SERVED}/"))), files
 
 
 #: Quality of the images of lightmaps. (WebP 85 takes a quarter more bytes, and has blocks on smooth
@@ -252,6 +253,7 @@ class LightStage(Stage["Light"]):
     recipe = 5
     changed = "light is in colour, of several bounces, and models without lamps have it, too"
     options = LightOptions
+    heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
     optional = True
     opens_inputs = True
@@ -326,7 +328,8 @@ class LightStage(Stage["Light"]):
         baking = light_baking(run, options, model_light, lights, pieces)
         shared = LitCells(baking, run.recorded(TEXTURES))
         tasks = list(enumerate(pieces))
-        cell_lights, total = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
+        baked, _ = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
+        cell_lights = [light for light, _ in baked]
         factor, exposure = (1.0, np.ones(len(pieces)))
         horizon = np.zeros((2, 3))
         if baking.building is not None:
@@ -346,7 +349,8 @@ class LightStage(Stage["Light"]):
         )
         run.keep(LIGHT, artifact)
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
-        counts = {**self.counts(artifact), "ptm_bytes": total, **_kind_of_light(shared.baking)}
+        total = sum(served for _, served in baked)
+        counts = {**self.counts(artifact), "bytes": total, **_kind_of_light(shared.baking)}
         if options.light_density < asked:
             counts["reduced_density"] = options.light_density
         return complete(work, counts, _notes(cell_lights))
@@ -368,9 +372,10 @@ class LightStage(Stage["Light"]):
             ("with ceilings that glow", n.get("ceilings")),
             (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced),
         )
+        total = n.get("bytes", n.get("ptm_bytes"))  # the latter of grey lightmaps
         return (
             f"{count(n['lightmaps'], 'lightmap')} of {count(n['texels'], 'texel')}, "
-            f"{size(n['ptm_bytes'])}" + "".join(f", {text}" for text, given in parts if given)
+            f"{size(total)}" + "".join(f", {text}" for text, given in parts if given)
         )
 
     def misfit(self, light: Light, source: Stage[Any], contents: Any) -> str:
