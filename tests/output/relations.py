@@ -37,9 +37,10 @@ def relations(
         yield from spatial_faults(of, index["viewpoints"], extent)
     with suppress(*FAULTS):
         yield from _boxes(index, of)
+    lightmaps = {n for n, row in enumerate(index["textures"]) if "light" in row}
     for i, record in of.items():
         with suppress(*FAULTS):
-            if fault := _shares(record):
+            if fault := _shares(record, lightmaps):
                 yield f"shares: {i}: {fault}"
     with suppress(*FAULTS):
         for name in ("cells", "textures"):
@@ -116,7 +117,7 @@ def _boxes(index: Any, records: Mapping[int, Any]) -> Iterator[str]:
             yield f"box: {i}: does not contain the leaves"
 
 
-def _shares(record: Any) -> str:
+def _shares(record: Any, lightmaps: set[int]) -> str:
     for shares, share in zip(record.get("textureShares", ()), record["ach"], strict=False):
         if abs(sum(part for _, part in shares) - share) > STATISTICS_SLACK:
             return "the textures' do not sum to the cell's"
@@ -126,11 +127,13 @@ def _shares(record: Any) -> str:
         return "the textures of the need are not in ascending order"
     if not visible >= {*numbers, *(texture for texture, _ in record.get("firstLook", ()))}:
         return "a texture of the need or the bundle is not visible"
-    needs = [row[2:] for row in record.get("need", ())]
-    if any(list(shares) != sorted(shares, reverse=True) for shares in needs):
+    needs = {row[0]: row[2:] for row in record.get("need", ())}
+    if any(list(shares) != sorted(shares, reverse=True) for shares in needs.values()):
         return "the need of a texture increases"
-    if sum(shares[0] for shares in needs) > 1 + NEED_SLACK:
-        return "the need sums to more than 1"
+    # A surface shows its image and its lightmap.
+    for numbers in (needs.keys() & lightmaps, needs.keys() - lightmaps):
+        if sum(needs[number][0] for number in numbers) > 1 + NEED_SLACK:
+            return "the need sums to more than 1"
     return ""
 
 

@@ -15,6 +15,7 @@ from ptmtools.errors import PtmError
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
 from ptmtools.texture import load_image, read_header
 from ptmtools.texture.detail import Detail, compare_levels, detail_of
+from ptmtools.texture.pyramid import build_pyramid
 from ptmtools.texture.reader import decode_levels
 from ptmtools.texture.samples import KINDS, in_eight_bits
 from ptmtools_systems.apo.files import inflate_texels
@@ -52,6 +53,12 @@ def textures(www: Path, index: Any, statistics: Any) -> Iterator[str]:
         with suppress(OSError, PtmError, KeyError, IndexError):
             data = (www / unquote(row["file"])).read_bytes()
             levels = list(decode_levels(data))
+            if (previews := row.get("previews")) and previews[-1].get("exact"):
+                image = load_image((www / unquote(previews[-1]["file"])).read_bytes()).array()
+                whole = build_pyramid(image)
+                if not all(map(np.array_equal, levels, whole)):
+                    yield f"texture: {row['file']}: levels of another image"
+                levels = whole
             for fault in _texture(row, levels, www):
                 yield f"texture: {row['file']}: {fault}"
             if hashes and hashes[i] != hashlib.sha256(data).hexdigest():

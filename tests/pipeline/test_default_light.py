@@ -1,4 +1,4 @@
-"""The light that a build has without `--light`: baked within a tenth of the bytes of the images."""
+"""The light of a build without `--light`: baked, within some bytes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ import pytest
 from PIL import Image
 
 from ptmtools.coverage.options import AchOptions
-from ptmtools.light.cells import LEAST, SHARE, affordable_density, round_bytes
+from ptmtools.light import cells
+from ptmtools.light.cells import (
+    BYTES,
+    SHARE,
+    affordable_density,
+    expected_bytes,
+    round_bytes,
+)
 from ptmtools.light.model import CellSurfaces
 from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
@@ -37,31 +44,21 @@ def floor(side: float, **kind: bool) -> CellSurfaces:
 
 
 def test_lightmaps_fit_the_images() -> None:
-    pieces = [floor(10.0), floor(10.0)]
-    whole = next(
-        n for n in (1 << k for k in range(30)) if affordable_density(pieces, 10.0, n) == 10.0
+    pieces = [floor(150.0), floor(150.0)]
+    assert expected_bytes(pieces, 10.0) > 2 * BYTES
+    few = affordable_density(pieces, 10.0, 0)
+    assert expected_bytes(pieces, few) == pytest.approx(BYTES)
+    # Beside images of up to ten times as many bytes it is the same.
+    assert affordable_density(pieces, 10.0, int(BYTES / SHARE)) == pytest.approx(few)
+    assert affordable_density(pieces, 10.0, int(1.5 * BYTES / SHARE)) == pytest.approx(
+        few * 1.5**0.5
     )
-    fewer = affordable_density(pieces, 10.0, whole // 2)
-    assert 10 * LEAST <= fewer < 10
-    # A quarter of the bytes has a quarter of the texels.
-    assert fewer == pytest.approx(10 * (whole / 2 / _enough(pieces)) ** 0.5, rel=1e-6)
-    assert affordable_density(pieces, 10.0, whole // 16) == 0
-    assert affordable_density(pieces, 10.0, 0) == 0
+    assert affordable_density(pieces, 10.0, 1 << 30) == 10.0
+    assert affordable_density([floor(10.0)], 10.0, 0) == 10.0
     assert affordable_density([floor(1e-5)], 10.0, 1 << 20) == 0
     assert (
         affordable_density([floor(10.0, glass=True), floor(10.0, dense=True)], 10.0, 1 << 30) == 0
     )
-
-
-def _enough(pieces: list[CellSurfaces]) -> float:
-    """The bytes of images beside which lightmaps have all texels, by bisection."""
-    low, high = 1, 1 << 40
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (
-            (low, middle) if affordable_density(pieces, 10.0, middle) == 10.0 else (middle, high)
-        )
-    return high
 
 
 def test_bytes_are_rounded() -> None:
@@ -85,32 +82,28 @@ def light_of(model: Path, db: Path, *options: Any) -> dict[str, Any]:
     return {**rows[LIGHT.name]["counts"], "ran": ran}
 
 
-def test_small_images_have_no_light_and_large_ones_have_it(tmp_path: Path) -> None:
+def test_the_bytes_of_images_bound_those_of_light(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model = Path(shutil.copytree(TWO_ROOMS, tmp_path / "model")) / "two_rooms.obj"
     repaint(model, 4)
     first = light_of(model, tmp_path / "db", AUTO)
-    assert (first["light"], first["lightmaps"]) == ("none", 0)
-    # The omission is reported, with the remedy, although the stage wrote nothing.
-    assert first["too_many_bytes"] > 0
-    assert LIGHT.name in first["ran"]
-    assert "--light bake" in LIGHT.summarize(first)
-    total = repaint(model, 96)
+    assert (first["light"], first["lightmaps"]) == ("bake", 2)
+    assert "reduced_density" not in first
+    assert 0 < first["bytes"] < BYTES
+    monkeypatch.setattr(cells, "BYTES", 1000)
+    total = repaint(model, 48)
     lit = light_of(model, tmp_path / "db", AUTO)
-    assert (lit["light"], lit["lightmaps"]) == ("bake", 2)
-    # Lightmaps of so few texels, with the noise of few rays, have more bytes a texel than expected.
-    assert 0 < lit["ptm_bytes"] <= 1.2 * SHARE * total
-    assert "reduced to 9.1 texels per metre, to save bytes" in LIGHT.summarize(lit)
     assert lit["ran"] >= {TEXTURES.name, LIGHT.name}
-    # As many bytes as before, but for the noise.
-    texels = np.random.default_rng(99).integers(0, 256, (96, 96, 3), dtype=np.uint8)
-    Image.fromarray(texels).save(sorted(model.parent.glob("*.png"))[0])
-    again = light_of(model, tmp_path / "db", AUTO)
-    assert TEXTURES.name in again["ran"]
-    assert LIGHT.name not in again["ran"]
+    assert lit["reduced_density"] < 10
+    assert lit["texels"] < first["texels"]
+    # Lightmaps of so few texels have more bytes a texel than expected.
+    assert 0 < lit["bytes"] <= 1.5 * SHARE * total
+    assert "texels per metre, to save bytes" in LIGHT.summarize(lit)
     # It is the same light as from the beginning.
     fresh = light_of(model, tmp_path / "fresh", AUTO)
-    assert {k: fresh[k] for k in ("lightmaps", "texels", "ptm_bytes")} == {
-        k: lit[k] for k in ("lightmaps", "texels", "ptm_bytes")
+    assert {k: fresh[k] for k in ("lightmaps", "texels", "bytes")} == {
+        k: lit[k] for k in ("lightmaps", "texels", "bytes")
     }
 
 

@@ -13,6 +13,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError, InputError
+from ptmtools.light.model import coded_light
 from ptmtools.light.options import LightOptions
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.options import EmitOptions
@@ -26,14 +27,14 @@ from ptmtools.pipeline.validation import validate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import arrays_of, sha256
-from ptmtools.texture import decode
+from ptmtools.texture import decode, load_image
 from tests.output.agreement import disagreements
 from tests.systems.apo.statues import write_rooms
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 
 QUICK = AchOptions(samples=4, backend="embree")
-BAKE = LightOptions("bake", light_samples=16)
+BAKE, PLAIN = LightOptions("bake", light_samples=4), LightOptions("none")
 
 
 def built(model: Path, db: Path, *options: Any, workers: int = 1) -> list[str]:
@@ -47,12 +48,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the model, a database without light, and one with it."""
     folder = tmp_path_factory.mktemp("light")
     model = write_rooms(folder / "model", 4)
-    built(model, folder / "plain.db")
+    built(model, folder / "plain.db", PLAIN)
     assert not list((folder / "plain.db/www").rglob("light~*"))
     assert LIGHT.name in built(model, folder / "lit.db", BAKE)
     shown = database_status(folder / "lit.db").stages
     (counts,) = (each.counts for each in shown if each.stage == LIGHT.name)
-    assert "lightmaps of" in LIGHT.summarize(counts)
+    files = [f for f in (folder / "lit.db/www").rglob("*") if "light~" in f.name]
+    assert counts["bytes"] == sum(f.stat().st_size for f in files) > 2000
+    assert "2 lightmaps of" in LIGHT.summarize(counts)
     return folder
 
 
@@ -74,7 +77,9 @@ def test_the_rest_of_the_database_stays(made: Path) -> None:
     assert {name for name in vrml | textures if lit[name] != plain[name]} == set()
     assert not any("light" in name for name in plain if not name.endswith(".json"))
     assert validate(made / "lit.db").issues == ()
-    assert list(disagreements(made / "lit.db")) == []
+    # The statues have a simplified mesh in GLBs.
+    lines = [line for line in disagreements(made / "lit.db/www") if "positions" not in line]
+    assert lines == []
 
 
 def test_each_cell_has_a_lightmap(made: Path) -> None:
@@ -85,9 +90,14 @@ def test_each_cell_has_a_lightmap(made: Path) -> None:
     rows = {row["light"]: row for row in served.index["textures"] if "light" in row}
     assert list(rows) == np.flatnonzero(light.side).tolist()
     for cell, row in rows.items():
-        texels = decode(served.file(row["file"]))
-        assert texels.shape == (light.side[cell], light.side[cell], 1)
-        assert (row["width"], row["components"]) == (light.side[cell], 1)
+        *_, finest = row["previews"]
+        assert finest["exact"]
+        assert (finest["width"], finest["height"]) == (light.side[cell], light.side[cell])
+        texels = load_image(served.file(finest["file"])).array()
+        assert texels.shape == (light.side[cell], light.side[cell], 3)
+        mean = decode(served.file(row["file"]))[0, 0]
+        assert (mean + row["offsets"][0]).tolist() == row["color"]
+        assert row["color"] == pytest.approx(texels.mean(axis=(0, 1)), abs=1)
     place = {cell: served.index["textures"].index(row) for cell, row in rows.items()}
     for record in served.records:
         for other, textures in zip(record["visible"], record["textures"], strict=True):
@@ -95,8 +105,10 @@ def test_each_cell_has_a_lightmap(made: Path) -> None:
         needs = {texture: (level, share) for texture, level, share, *_ in record["need"]}
         for other, share in zip(record["visible"], record["ach"], strict=True):
             if share:
-                finest = len(rows[other]["ends"]) - 1
-                assert needs[place[other]] == (finest, pytest.approx(share, rel=0.01))
+                assert needs[place[other]] == (
+                    rows[other]["previews"][-1]["level"],
+                    pytest.approx(share, rel=0.01),
+                )
 
 
 def test_dense_objects_have_colours_and_the_others_coordinates(made: Path) -> None:
@@ -106,7 +118,13 @@ def test_dense_objects_have_colours_and_the_others_coordinates(made: Path) -> No
     assert statues
     assert all(p.light is None and p.color is not None for p in statues)
     assert all(p.light is not None and p.color is None for p in others)
-    assert {p.material.lightmap for p in others} == {"../textures/light~c0000.png"}
+    served = read_served(made / "lit.db")
+    (row,) = (row for row in served.index["textures"] if row.get("light") == 0)
+    assert {p.material.lightmap for p in others} == {f"../{row['fallback']}"}
+    light = Artifacts(DatabaseFolder.open(made / "lit.db")).stored(LIGHT)
+    assert light is not None
+    (white,) = {p.material.white for p in glb.primitives}
+    assert white == pytest.approx(light.white[0], rel=1e-4)
     shade = np.concatenate([p.color for p in statues if p.color is not None])
     assert shade.max() > 2 * shade.min()
 
@@ -135,8 +153,11 @@ def test_lamps_of_a_model(tmp_path: Path) -> None:
     light = Artifacts(DatabaseFolder.open(tmp_path / "1.db")).stored(LIGHT)
     assert light is not None
     served = read_served(tmp_path / "1.db")
-    lightmaps = [row["file"] for row in served.index["textures"] if "light" in row]
-    assert min(decode(served.file(name)).min() for name in lightmaps) > 20
+    for row in (row for row in served.index["textures"] if "light" in row):
+        codes = load_image(served.file(row["previews"][-1]["file"])).array()
+        shown = light.exposure[row["light"]] * coded_light(codes, light.white[row["light"]])
+        assert 0.01 < shown.min() < 0.5
+        assert shown.max() > 1
     glbs = [read_glb(f.read_bytes()) for f in (tmp_path / "1.db/www/gltf").glob("*.glb")]
     panels = [k for glb in glbs for k in glb.primitives if k.object == "panel"]
     assert panels
@@ -149,7 +170,7 @@ def test_baked_again_only_when_something_has_changed(made: Path, folder: Path) -
     (plan,) = (p for p in plan_build(model, db, QUICK, BAKE) if p.stage == LIGHT.name)
     assert plan.plan == "current"
     assert built(model, db, BAKE, TextureOptions(fallback=False)) == ["textures", "light", "emit"]
-    assert not any("light~" in name for name in contents(db) if name.endswith(".png"))
+    assert not any(name.endswith(".png") for name in contents(db))
     assert built(model, db, BAKE) == ["textures", "light", "emit"]
     assert contents(db) == contents(made / "lit.db")
 
@@ -166,7 +187,7 @@ def test_plans_and_causes(folder: Path) -> None:
         "stale",
         "made from an earlier choice of options of textures",
     )
-    run_stage(db, LightOptions(), workers=1)
+    run_stage(db, PLAIN, workers=1)
     messages = [issue.message for issue in validate(db).issues if issue.code == "PTM-D656"]
     assert any("which no stage has written" in message for message in messages)
 
@@ -179,7 +200,7 @@ def test_a_rebuild_leaves_nothing_to_do(folder: Path) -> None:
 
 def test_light_comes_and_goes(folder: Path) -> None:
     model, db = folder / "model/two_rooms.obj", folder / "lit.db"
-    assert built(model, db) == ["light", "emit"]
+    assert built(model, db, PLAIN) == ["light", "emit"]
     assert contents(db) == contents(folder / "plain.db")
     run_stage(db, BAKE, workers=1)
     assert {s.stage: s.state for s in database_status(db).stages}["emit"] == "stale"
@@ -194,8 +215,7 @@ def test_a_database_of_an_earlier_release(folder: Path) -> None:
     (db / "manifest.json").write_text(json.dumps(manifest))
     assert {s.state for s in database_status(db).stages} == {"done"}
     assert validate(db).issues == ()
-    # It writes nothing, and says why.
-    assert built(folder / "model/two_rooms.obj", db) == [LIGHT.name]
+    assert built(folder / "model/two_rooms.obj", db, PLAIN) == []
 
 
 @pytest.mark.parametrize("options", [{"light_density": 0.0}, {"light_samples": 0}])
@@ -222,7 +242,7 @@ def test_density_is_of_all_lightmaps(light: Any) -> None:
     [
         ("none", {"light_density": 4.0}),
         ("model", {"light_samples": 9}),
-        ("none", {"light_reach": 9}),
+        ("none", {"light_samples": 9}),
     ],
 )
 def test_options_of_other_light(light: Any, more: dict[str, Any]) -> None:
@@ -252,6 +272,10 @@ def replaced(db: Path, **arrays: Any) -> None:
         ("side", lambda side: -side),
         ("side", lambda side: side[1:]),
         ("vertex", lambda vertex: vertex[1:]),
+        ("vertex", lambda vertex: vertex[..., 0]),
+        ("white", lambda white: 0 * white),
+        ("exposure", lambda exposure: exposure[1:]),
+        ("horizon", lambda horizon: horizon[:1]),
         ("mapped", lambda mapped: mapped.astype(np.int8)),
     ],
 )

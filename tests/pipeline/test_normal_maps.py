@@ -28,12 +28,13 @@ from tests.output.agreement import disagreements
 from tests.pipeline.test_relief import with_materials
 from tests.scene.bumpy import write_bumpy
 
-QUICK = AchOptions(samples=4, backend="embree")
+QUICK, DARK = AchOptions(samples=4, backend="embree"), LightOptions("none")
 LIGHT = LightOptions(light="bake", light_density=4, light_samples=4)
 
 
 def built(model: Path, db: Path, *options: Any) -> list[str]:
-    """The stages that a build runs."""
+    """The stages that a build runs; without light, unless asked for."""
+    options = options if any(isinstance(k, LightOptions) for k in options) else (DARK, *options)
     report = build_scene(model, db, QUICK, *options, workers=1)
     return [stage.stage for stage in report.stages if stage.ran]
 
@@ -184,7 +185,8 @@ def test_a_map_that_is_gone(folder: Path) -> None:
     db = folder / "db"
     (db / "www/textures/waves.ptm").unlink()
     assert {issue.code for issue in validate(db).issues} >= {"PTM-D651"}
-    assert main(["build-scene", "-q", str(folder / "model/two_rooms.obj"), "-o", str(db)]) == 0
+    words = ["build-scene", "-q", str(folder / "model/two_rooms.obj"), "-o", str(db)]
+    assert main([*words, "--light", "none"]) == 0
 
 
 def test_normals_that_become_heights(folder: Path) -> None:

@@ -18,6 +18,7 @@ from hypothesis import given, strategies as st
 from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, OutputError
+from ptmtools.light.options import LightOptions
 from ptmtools.output import EmitOptions, validate_database
 from ptmtools.output.gltf import linear, pack, unpack
 from ptmtools.output.gltf_reader import read_glb
@@ -356,7 +357,7 @@ def test_lossy_images_of_the_model_are_named_by_extensions(
     noise = np.random.default_rng(0).integers(0, 256, (8, 8, 3), np.uint8)
     image = Image.fromarray(noise).resize((128, 128))
     image.save(model / "floor.png", name, quality=60)
-    build_scene(model / "two_rooms.obj", tmp_path / "db")
+    build_scene(model / "two_rooms.obj", tmp_path / "db", LightOptions("none"))
     www = tmp_path / "db/www"
     (texture,) = (
         row
