@@ -25,7 +25,7 @@ from ptmtools.light.lamps import Lamps, direct_light, lamps_near, lamps_of
 from ptmtools.light.looks import planes
 from ptmtools.light.occlusion import Occluders, normals, points_on, spread_over, turns
 from ptmtools.light.patches import LightPatches
-from ptmtools.light.transport import Daylight, LightField, transport
+from ptmtools.light.transport import PASSES, Daylight, LightField, transport
 from ptmtools.scene.colors import luminance
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ _SAMPLES, _RAYS = 4096, 32
 #: Points with less than this share of the usual light are dark; ceilings over them glow if this
 #: share of the surfaces is dark, and so much as a share of the usual light.
 _DARK, _MANY, _LIFT = 0.02, 0.01, 0.5
+#: Passes for what ceilings add to a light in balance.
+_AGAIN = 6
 #: Points of a face, and rays from each, that tell which side is brighter; sides are alike up to
 #: this ratio of their light.
 _SIDE_POINTS, _SIDE_RAYS, _ALIKE = 4, 8, 2.0
@@ -193,7 +195,7 @@ class BuildingBaking:
         emission = self._ceilings(_LIFT * building.usual * WARM, building)
         if emission is None:
             return building
-        return self._balanced(lamps, coarse, daylight, emission)
+        return self._balanced(lamps, coarse, daylight, emission, building.field)
 
     def _points(self) -> tuple[Floats, Floats, Floats]:
         """(n, 3) points that stand for all surfaces, (n, 3) their normals and (n,) turns."""
@@ -225,7 +227,12 @@ class BuildingBaking:
         return first, second, third
 
     def _balanced(
-        self, lamps: Lamps, coarse: Lamps, daylight: Daylight, emission: Floats | None
+        self,
+        lamps: Lamps,
+        coarse: Lamps,
+        daylight: Daylight,
+        emission: Floats | None,
+        start: LightField | None = None,
     ) -> BuildingLight:
         patches, around = self._patches, self._around
         spread, direct = turns(patches.count), np.zeros((patches.count, 3))
@@ -233,7 +240,8 @@ class BuildingBaking:
             point, normal = self._patch_points(k / _POINTS)
             direct += direct_light(around, coarse, point, normal, spread, _SHADOWS) / _POINTS
         glow = 0.0 if emission is None else emission
-        field = transport(around, patches, self._albedo, direct, daylight, glow)
+        passes = PASSES if start is None else _AGAIN
+        field = transport(around, patches, self._albedo, direct, daylight, glow, passes, start)
         building = BuildingLight(field, lamps, 1.0, sky=False, ceilings=emission is not None)
         point, normal, turn = self._points()
         light = luminance(building._light(point, normal, turn, _RAYS))

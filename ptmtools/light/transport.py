@@ -129,14 +129,16 @@ def transport(
     daylight: Daylight,
     emission: Floats | float = 0.0,
     passes: int = PASSES,
+    start: LightField | None = None,
 ) -> LightField:
     """The light of a building in balance. ``albedo``: (F, 3) of the faces of the patches;
     ``direct``: (patches, 3) the light of lamps; ``emission``: (patches, 3) what
-    patches send that are no lamps; ``passes``: at least 1."""
+    patches send that are no lamps; ``passes``: at least 1; ``start``: the same without emission."""
     face, side, number = patches.faces()
     normal = normals(patches.corner)[face] * np.where(side == 0, 1.0, -1.0)[:, None]
     reflected = np.minimum(albedo, MOST_REFLECTED)[face]
-    radiance = (reflected * direct + emission).astype(np.float32)
+    before = reflected * direct if start is None else start.radiance
+    radiance = (before + emission).astype(np.float32)
     emitted = np.broadcast_to(emission, radiance.shape)
     field = LightField(around, patches, radiance, daylight)
     step, counted = max(1, RAYS // PASS_RAYS), min(COUNTED, passes)
