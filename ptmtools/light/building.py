@@ -21,7 +21,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, sum_by_group
-from ptmtools.light.lamps import Lamps, direct_light, lamps_near, lamps_of
+from ptmtools.light.lamps import (
+    Lamps,
+    direct_light,
+    lamp_radiance,
+    lamps_near,
+    lamps_of,
+)
 from ptmtools.light.looks import planes
 from ptmtools.light.occlusion import Occluders, normals, points_on, spread_over, turns
 from ptmtools.light.patches import LightPatches
@@ -54,7 +60,7 @@ _LAMP, _LAMPS = 0.4, 1024
 _SAMPLES, _RAYS = 4096, 32
 #: Points with less than this share of the usual light are dark; ceilings over them glow if this
 #: share of the surfaces is dark, and so much as a share of the usual light.
-_DARK, _MANY, _LIFT = 0.02, 0.01, 0.5
+_DARK, _MANY, _LIFT = 0.02, 0.03, 0.5
 #: Passes for what ceilings add to a light in balance.
 _AGAIN = 6
 #: Points of a face, and rays from each, that tell which side is brighter; sides are alike up to
@@ -75,6 +81,7 @@ class BuildingLight:
     lamps: in the units of the field.
     usual: luminance of the median of its light.
     sky, ceilings: whether the sky is seen from some surface, and whether ceilings glow.
+    shine: (M, 3) what materials that are lamps send, in the units of the field; 0 of others.
     """
 
     field: LightField
@@ -82,6 +89,7 @@ class BuildingLight:
     usual: float
     sky: bool
     ceilings: bool
+    shine: Floats
 
     def look(self, corner: Floats, side: Floats, samples: int, near: float) -> GatheredLight:
         """The light of (n, 3, 3) faces on their (n,) sides, 1 for the front and -1 for the back, by
@@ -179,6 +187,7 @@ class BuildingBaking:
         sky = level * BLUE
         daylight = Daylight(sky, GROUND * (sky + lux / math.pi))
         lamps = lamps_of(self._scene, self._lights)
+        self._shine = np.zeros((len(self._scene.materials), 3))
         coarse = lamps_of(self._scene, self._lights, _LAMP, _LAMPS)
         if not len(lamps.kind):
             emission = self._ceilings(CEILING * SKY * WARM)
@@ -186,6 +195,8 @@ class BuildingBaking:
         factors = self._factors(lamps, daylight)
         daylight = Daylight(factors[1] * daylight.sky, factors[1] * daylight.ground)
         lamps, coarse = (_strengthened(some, factors) for some in (lamps, coarse))
+        if self._lights is not None:
+            self._shine = factors[2] * lamp_radiance(self._scene, self._lights)
         building = self._balanced(lamps, coarse, daylight, None)
         point, normal, turn = self._points()
         light = luminance(building._light(point, normal, turn, _RAYS))
@@ -242,7 +253,7 @@ class BuildingBaking:
         glow = 0.0 if emission is None else emission
         passes = PASSES if start is None else _AGAIN
         field = transport(around, patches, self._albedo, direct, daylight, glow, passes, start)
-        building = BuildingLight(field, lamps, 1.0, sky=False, ceilings=emission is not None)
+        building = BuildingLight(field, lamps, 1.0, False, emission is not None, self._shine)
         point, normal, turn = self._points()
         light = luminance(building._light(point, normal, turn, _RAYS))
         lit = light[light > 0]

@@ -191,7 +191,7 @@ class LightBaking:
         if self.building is None:
             look = self._look(piece, corner, side, rows, 1.0)
             return np.repeat(look(grid.face, point, turn), 3, axis=1)
-        near = 0.5 / self.options.light_density
+        near = 0.5 * grid.texel
         lit = self.building.look(corner[rows], side[rows], self.options.light_samples, near)
         light, variance = lit.indirect(grid.face, point, turn)
         # What few rays meet, as a window far away, is missed by most of the texels around.

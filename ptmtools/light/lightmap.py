@@ -16,15 +16,16 @@ whose linear interpolation is nearest to the light at many points of the faces, 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles, areas
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.jit import kernel
 from ptmtools.light.atlas import Atlas, claim, cover, nearest
-from ptmtools.light.looks import Look
+from ptmtools.light.looks import SMALLEST, Look
 from ptmtools.light.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
@@ -65,6 +66,12 @@ class TexelGrid:
         row, column = np.nonzero(owner >= 0)
         face = owner[row, column].astype(np.int64)
         return TexelGrid(corner, atlas.uv, row, column, face, chart, centre >= 0)
+
+    @property
+    def texel(self) -> float:
+        """Metres of a texel."""
+        share = plane_areas(self.uv).sum() / max(areas(self.corner).sum(), SMALLEST)
+        return 1 / max(len(self.chart) * math.sqrt(share), SMALLEST)
 
     def points(self, number: Ints | slice = slice(None)) -> Floats:
         """(n, 3) the points of faces that are nearest to the centres of texels."""

@@ -20,7 +20,7 @@ from ptmtools.tolerance import PARALLEL_COSINE
 #: light in colours, or (n, 1); NaN of points that something covers.
 Look = Callable[[Ints, Floats, Floats], Singles]
 #: Areas, m², and densities below this count as this.
-SMALLEST = 1e-9
+SMALLEST = 1e-30
 
 
 @dataclass(frozen=True)

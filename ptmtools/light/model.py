@@ -68,6 +68,7 @@ class Light:
     vertex: (M, 3, 3) uint8 shares of white at the corners, encoded as sRGB; 255 where it is not at
         vertices.
     horizon: (2, 3) radiance of the sky and of the ground.
+    shine: (M, 3) the linear colours, of 1 at most, that materials have that are lamps; 0 of others.
     toned: whether the light shows by a tone curve; else it is the model's own, of 1 at most.
     """
 
@@ -79,6 +80,7 @@ class Light:
     uv: NDArray[np.float32]
     vertex: NDArray[np.uint8]
     horizon: Floats
+    shine: Floats
     toned: bool = True
 
     def display(self) -> dict[str, Any]:
@@ -117,5 +119,6 @@ class Light:
             uv,
             stored.array("vertex", np.uint8, len(uv), 3, 3),
             stored.array("horizon", np.float64, 2, 3, finite=True),
+            stored.array("shine", np.float64, None, 3, finite=True),
             bool(stored.array("toned", np.bool_, 1)[0]),
         )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions
 from ptmtools.output.numbers import shares_of
 from ptmtools.output.representation import Represented, object_maps, replaced_objects
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.model import Scene
+from ptmtools.scene.colors import to_linear, to_srgb
+from ptmtools.scene.model import Material, Scene
 from ptmtools.visibility.model import Pvs
 
 if TYPE_CHECKING:
@@ -111,6 +112,17 @@ class Content:
         return lit.with_object_maps(maps, self.scene, self.cells) if maps else lit
 
     @cached_property
+    def shown_materials(self) -> tuple[Material, ...]:
+        """The materials of the scene; in a building with light, lamps without an image shine."""
+        light, materials = self.extras.light, self.scene.materials
+        if light is None:
+            return materials
+        return tuple(
+            replace(m, color=_brighter(m.color, s)) if m.image < 0 and s.any() else m
+            for m, s in zip(materials, light.shine, strict=True)
+        )
+
+    @cached_property
     def position_exponent(self) -> int:
         """Exponent of the step of positions in compressed cells, a power of two in metres."""
         from ptmtools.output.grid import position_exponent
@@ -172,3 +184,7 @@ class Content:
     def shares(self) -> list[list[float]]:
         """For each cell its ACH as written, aligned with its row of the PVS."""
         return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]
+
+
+def _brighter(color: tuple[float, float, float], shine: NDArray[np.float64]) -> Any:
+    return tuple(to_srgb(np.maximum(to_linear(np.array(color)), shine)).tolist())

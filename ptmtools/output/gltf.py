@@ -316,7 +316,12 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
     lightmap, light = places.of_cell.get(cell), content.extras.light
     white = significant(light.white[cell : cell + 1])[0] if light else 0.0
     materials = MaterialWriter(
-        scene.materials, places.of_image, options.fallback, lightmap, white, places.of_object
+        content.shown_materials,
+        places.of_image,
+        options.fallback,
+        lightmap,
+        white,
+        places.of_object,
     )
     represented = content.extras.represented
     replaced, extras = replaced_objects(represented), node_extras(represented)

@@ -52,7 +52,7 @@ def light_on(field: LightField, face: int, samples: int = 256) -> Floats:
     share = np.random.default_rng(1).dirichlet((1, 1, 1), 200)
     point = share @ field.patches.corner[face]
     normal = np.repeat(normals(field.patches.corner[[face]]), len(point), axis=0)
-    light, _ = field.gather(point, normal, turns(len(point)), samples, 0.0)
+    light, _, _ = field.gather(point, normal, turns(len(point)), samples, 0.0)
     return np.asarray(light.mean(axis=0, dtype=np.float64))
 
 
@@ -129,5 +129,5 @@ def test_patches_find_their_points_again() -> None:
     hit = field.around.tree.run(start, along, output=True)
     met = (hit["primID"] == face) & (hit["tfar"] < 2e-4)
     assert met.mean() > 0.9
-    light, _ = field._receive(start, along, 1, 0.0)
+    light, _, _ = field._receive(start, along, 1, 0.0)
     assert (light[met] == field.radiance[met]).all(axis=1).mean() > 0.995

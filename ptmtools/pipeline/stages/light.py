@@ -331,11 +331,13 @@ class LightStage(Stage["Light"]):
         baked, _ = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
         cell_lights = [light for light, _ in baked]
         factor, exposure = (1.0, np.ones(len(pieces)))
-        horizon = np.zeros((2, 3))
+        horizon, shine = np.zeros((2, 3)), np.zeros((len(scene.materials), 3))
         if baking.building is not None:
             factor, exposure = _exposures(cell_lights, cells)
             daylight = baking.building.field.daylight
             horizon = factor * np.array([daylight.sky, daylight.ground])
+            shine = factor * baking.building.shine
+            shine /= np.maximum(shine.max(axis=1, keepdims=True), 1)
         artifact = Light(
             np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
             factor * np.array([light.white for light in cell_lights]),
@@ -345,6 +347,7 @@ class LightStage(Stage["Light"]):
             np.concatenate([light.uv for light in cell_lights]),
             np.concatenate([light.vertex for light in cell_lights]),
             horizon,
+            shine,
             baking.building is not None,
         )
         run.keep(LIGHT, artifact)
