@@ -31,7 +31,9 @@ EYE = (-2.1, 1.6, 0.9, 20.0)
 def database(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bumpy")
     options = ["--samples", "4", "--format", "gltf", "-j", "1", "--plain-gltf"]
-    if request.param == "lit":
+    if request.param == "unlit":
+        options += ["--light", "none"]
+    else:
         pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
         options += ["--light", "bake", "--light-density", "4", "--light-samples", "8"]
     options += ["--viewpoint", ",".join(map(str, EYE))]

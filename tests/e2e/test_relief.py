@@ -38,6 +38,7 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = write_rooms(folder / "model", 5)
     options = ["--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.01"]
     options += ["--relief", "normal-map", "--format", "gltf", "-j", "1", "--plain-gltf"]
+    options += ["--light", "none"]
     options += ["--viewpoint", ",".join(map(str, (*EYE, 0)))]
     assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), *options]) == 0
     return folder / "db"

@@ -30,6 +30,7 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = write_rooms(folder / "model", 5)
     options = ["--apo", "statue*", "--apo-faces", "500", "--apo-error", "0.01"]
     options += ["--relief", "normal-map", "--format", "gltf", "-j", "1", "--backend", "embree"]
+    options += ["--light", "none"]
     assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), *options]) == 0
     return folder / "db"
 
