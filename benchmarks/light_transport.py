@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from time import process_time
 
@@ -39,7 +38,6 @@ from ptmtools.light.lamps import Lamps, direct_light, lamps_of
 from ptmtools.light.occlusion import Occluders, normals, turns
 from ptmtools.light.patches import LightPatches
 from ptmtools.light.transport import PASSES, Daylight, transport
-from ptmtools.scene.colors import luminance
 from ptmtools.scene.lights import Lights
 from ptmtools.scene.model import Material
 from ptmtools_lab.measures import flip
@@ -73,7 +71,7 @@ class TransportedView:
         scene = model.scene
         self._faces = np.flatnonzero(scene.opaque)
         self._around = Occluders.from_scene(scene)
-        self._lamps = list(colored_lamps(model))
+        self._lamps = lamps_of_model(model)
         begin = process_time()
         both = np.ones((len(self._faces), 2), np.bool_)
         patches = LightPatches.of_faces(scene.corners[self._faces], both, setting.patch)
@@ -106,7 +104,7 @@ class TransportedView:
         normal = normals(self._model.scene.corners[face])
         normal *= np.where(np.einsum("nx,nx->n", normal, way[shown]) > 0, -1, 1)[:, None]
         begin, spread = process_time(), turns(len(point))
-        light, _ = self._field.gather(point, normal, spread, self._rays, 0.0)
+        light = self._field.gather(point, normal, spread, self._rays).light
         light = light + self._direct(point, normal, spread, _PIXEL_SHADOWS)
         self._gathering += process_time() - begin
         self._points += len(point)
@@ -128,11 +126,7 @@ class TransportedView:
         return light
 
     def _direct(self, point: Floats, normal: Floats, turn: Floats, rays: int) -> Floats:
-        light = np.zeros((len(point), 3))
-        for lamps, color in self._lamps:
-            grey = direct_light(self._around, lamps, point, normal, turn, rays) / math.pi
-            light += grey[:, None] * color
-        return light
+        return direct_light(self._around, self._lamps, point, normal, turn, rays)
 
     def _base(self, face: Ints, u: NDArray[np.float32], v: NDArray[np.float32]) -> Floats:
         """(n, 3) reflectance of faces at barycentric coordinates, by the nearest texel."""
@@ -158,31 +152,19 @@ def luminous(model: LitModel) -> Floats:
     return np.asarray(glow)
 
 
-def colored_lamps(model: LitModel) -> Iterator[tuple[Lamps, Floats]]:
-    """Lamps and surfaces of one colour, and it: (3,) with a luminance of 1."""
+def lamps_of_model(model: LitModel) -> Lamps:
+    """The lamps of a model, and its surfaces that glow, with a material for each radiance."""
     scene = model.scene
-    shades = [lamp.color / luminance(lamp.color) for lamp in model.lamps]
-    for shade in np.unique(shades, axis=0) if shades else ():
-        chosen = tuple(
-            lamp
-            for lamp, own in zip(scene.lights.lamps, shades, strict=True)
-            if np.allclose(own, shade)
-        )
-        lights = replace(Lights.none(len(scene.materials)), lamps=chosen)
-        yield lamps_of(scene, lights), shade
-    nits = luminous(model)
-    for color in np.unique(nits[nits.any(axis=1)], axis=0):
-        glowing = (nits == color).all(axis=1)
-        material = np.where(glowing, len(scene.materials), scene.triangle_material)
-        lit = replace(
-            scene,
-            materials=(*scene.materials, Material("glow")),
-            triangle_material=material.astype(scene.triangle_material.dtype),
-        )
-        glow = Lights.none(len(lit.materials)).glow
-        glow[-1] = color
-        lights = replace(Lights.none(len(lit.materials)), glow=glow)
-        yield lamps_of(lit, lights), color / luminance(color)
+    radiance, number = np.unique(luminous(model), axis=0, return_inverse=True)
+    glowing = replace(
+        scene,
+        materials=tuple(Material("glow") for _ in radiance),
+        triangle_material=number.ravel().astype(scene.triangle_material.dtype),
+    )
+    lights = replace(Lights.none(len(radiance)), glow=radiance.astype(np.float32))
+    if scene.lights:
+        lights = replace(lights, lamps=scene.lights.lamps)
+    return lamps_of(glowing, lights)
 
 
 def eye_rays(view: EyeView, size: tuple[int, int]) -> tuple[Floats, NDArray[np.float32]]:
