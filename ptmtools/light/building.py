@@ -191,13 +191,13 @@ class BuildingBaking:
         coarse = lamps_of(self._scene, self._lights, _LAMP, _LAMPS)
         if not len(lamps.kind):
             emission = self._ceilings(CEILING * SKY * WARM)
-            return self._balanced(lamps, coarse, daylight, emission)
+            return self._balance(lamps, coarse, daylight, emission)
         factors = self._factors(lamps, daylight)
         daylight = Daylight(factors[1] * daylight.sky, factors[1] * daylight.ground)
-        lamps, coarse = (_strengthened(some, factors) for some in (lamps, coarse))
+        lamps, coarse = (_strengthen(some, factors) for some in (lamps, coarse))
         if self._lights is not None:
             self._shine = factors[2] * lamp_radiance(self._scene, self._lights)
-        building = self._balanced(lamps, coarse, daylight, None)
+        building = self._balance(lamps, coarse, daylight, None)
         point, normal, turn = self._points()
         light = luminance(building._light(point, normal, turn, _RAYS))
         dark = light < _DARK * building.usual
@@ -206,7 +206,7 @@ class BuildingBaking:
         emission = self._ceilings(_LIFT * building.usual * WARM, building)
         if emission is None:
             return building
-        return self._balanced(lamps, coarse, daylight, emission, building.field)
+        return self._balance(lamps, coarse, daylight, emission, building.field)
 
     def _points(self) -> tuple[Floats, Floats, Floats]:
         """(n, 3) points that stand for all surfaces, (n, 3) their normals and (n,) turns."""
@@ -237,7 +237,7 @@ class BuildingBaking:
         first, second, third = (max(present) / value if value else 1.0 for value in usual)
         return first, second, third
 
-    def _balanced(
+    def _balance(
         self,
         lamps: Lamps,
         coarse: Lamps,
@@ -293,7 +293,7 @@ class BuildingBaking:
         return emission
 
 
-def _strengthened(lamps: Lamps, factors: tuple[float, float, float]) -> Lamps:
+def _strengthen(lamps: Lamps, factors: tuple[float, float, float]) -> Lamps:
     """The lamps with a factor for each group."""
     power = lamps.power.copy()
     for group, factor in zip(lamps.groups(), factors, strict=True):

@@ -211,7 +211,7 @@ class LightBaking:
     ) -> Look:
         """The light of some pieces, by this share of the rays of the options."""
         if self.painted is not None:
-            return _brightened(replace(self.painted, source=self.painted.source[piece.face[rows]]))
+            return _brighten(replace(self.painted, source=self.painted.source[piece.face[rows]]))
         assert self.building is not None
         samples = math.ceil(rays * self.options.light_samples)
         return self.building.look(corner[rows], side[rows], samples, 0.0)
@@ -226,7 +226,7 @@ class LightBaking:
         return float(f"{white:.3g}") if white > 0 else self.building.usual
 
 
-def _brightened(painted: PaintedLight) -> Look:
+def _brighten(painted: PaintedLight) -> Look:
     def look(face: Ints, point: Floats, turn: Floats) -> Singles:
         return np.maximum(painted(face, point, turn), np.float32(_PAINTED))
 

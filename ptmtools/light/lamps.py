@@ -80,13 +80,13 @@ class Lamps:
 
 
 def lamps_of(
-    scene: Scene, lights: Lights | None, size: float = PATCH, most: int = MOST_PATCHES
+    scene: Scene, lights: Lights | None, size: float = PATCH, limit: int = MOST_PATCHES
 ) -> Lamps:
     """The lamps of a scene; none if it has none. ``size``: metres of a patch of a surface, of which
-    there are at most ``most``."""
+    there are at most ``limit``."""
     if lights is None:
         lights = Lights.none(len(scene.materials))
-    patches = _patches(scene, lamp_radiance(scene, lights), size, most)
+    patches = _patches(scene, lamp_radiance(scene, lights), size, limit)
     single = Lamps(
         np.array([KINDS.index(lamp.kind) for lamp in lights.lamps], np.uint8),
         np.array([lamp.position for lamp in lights.lamps]).reshape(-1, 3),
@@ -96,15 +96,15 @@ def lamps_of(
         np.array([lamp.cone for lamp in lights.lamps]).reshape(-1, 2),
         np.array([lamp.color for lamp in lights.lamps]).reshape(-1, 3),
     )
-    pairs = zip(vars(_merge(single, most)).values(), vars(patches).values(), strict=True)
+    pairs = zip(vars(_merge(single, limit)).values(), vars(patches).values(), strict=True)
     return Lamps(*(np.concatenate(pair) for pair in pairs))
 
 
-def _merge(lamps: Lamps, most: int) -> Lamps:
+def _merge(lamps: Lamps, limit: int) -> Lamps:
     """Lamps without a surface, at most that number: those of a kind in a cube with ways and cones
     alike become one, with the sum of their powers and the means, weighted by these, of all else."""
     lamps, size = lamps.only(lamps.power > 0), 1.0
-    while len(lamps) > most:
+    while len(lamps) > limit:
         turned, placed = lamps.kind != _POINT, lamps.kind != _SUN
         cube = np.where(placed[:, None], lamps.place, 0) // (size * PATCH)
         shape = np.concatenate([lamps.way, lamps.cone], axis=1)
@@ -143,12 +143,12 @@ def lamp_radiance(scene: Scene, lights: Lights) -> Floats:
     return glow
 
 
-def _patches(scene: Scene, glow: Floats, size: float, most: int) -> Lamps:
+def _patches(scene: Scene, glow: Floats, size: float, limit: int) -> Lamps:
     faces = np.flatnonzero(glow[scene.triangle_material].any(axis=1))
     corner = scene.corners[faces]
     area = areas(corner)
     total = float(area.sum())
-    count = min(most, max(len(faces), math.ceil(total / size**2))) if total else 0
+    count = min(limit, max(len(faces), math.ceil(total / size**2))) if total else 0
     chosen = np.zeros(0, np.int64)
     if count:
         chosen = spread_over(area, np.zeros(len(faces), np.int64), np.array([0]), count)[0]

@@ -154,9 +154,9 @@ def smooth(
         for column in range(width):
             if chart[row, column] < 0:
                 continue
-            own = 0.0
+            centre = 0.0
             for k in range(channels):
-                own += value[row, column, k] / channels
+                centre += value[row, column, k] / channels
             apart = _APART * np.sqrt(variance[row, column]) + least
             weight, total = 0.0, 0.0
             for i in range(-2, 3):
@@ -166,10 +166,10 @@ def smooth(
                         continue
                     if chart[r, c] != chart[row, column]:
                         continue
-                    other = 0.0
+                    mean = 0.0
                     for k in range(channels):
-                        other += value[r, c, k] / channels
-                    share = spline[abs(i)] * spline[abs(j)] * np.exp(-abs(own - other) / apart)
+                        mean += value[r, c, k] / channels
+                    share = spline[abs(i)] * spline[abs(j)] * np.exp(-abs(centre - mean) / apart)
                     weight += share
                     total += share * share * variance[r, c]
                     for k in range(channels):

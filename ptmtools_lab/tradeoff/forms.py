@@ -315,14 +315,14 @@ def light_experiment(
     corner = scene.corners[face]
     point, normal = points_on(corner, np.arange(1, len(face) + 1)), normals(corner)
 
-    def lit(samples: int, turn: Floats) -> Floats:
+    def measure_light(samples: int, turn: Floats) -> Floats:
         return light(around, point, normal, turn, samples, defaults.reach).astype(np.float64)
 
-    truth, again = (lit(limit, random.random(len(face))) for _ in range(2))
+    truth, again = (measure_light(limit, random.random(len(face))) for _ in range(2))
     turn = random.random(len(face))
 
     def measure(setting: Setting) -> Measurement:
-        value, seconds = time_work(lambda: lit(setting.knobs["samples"], turn))
+        value, seconds = time_work(lambda: measure_light(setting.knobs["samples"], turn))
         off = 255 * np.abs(value - truth)
         return Measurement(
             seconds=seconds,

@@ -221,8 +221,8 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
         beside = np.minimum(area[near], area[cell]) / 4
         total[cell] += wanted[near] @ beside
         weight[cell] += beside.sum()
-    own = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
-    return math.exp(usual), np.exp(np.clip(own - usual, -_MOST_STOPS, _MOST_STOPS))
+    wished = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
+    return math.exp(usual), np.exp(np.clip(wished - usual, -_MOST_STOPS, _MOST_STOPS))
 
 
 def _notes(lights: list[CellLight]) -> Iterator[str]:
