@@ -83,7 +83,7 @@ class TransportedView:
             albedo,
             self._direct_on(patches),
             Daylight(*model.daylight),
-            setting.passes,
+            passes=setting.passes,
         )
         self.seconds, self._gathering, self._points = process_time() - begin, 0.0, 0
         self.count = patches.count

@@ -13,6 +13,7 @@ from PIL import Image, PngImagePlugin
 
 from ptmtools import parallel
 from ptmtools.executor import Executor
+from ptmtools.light.options import LightOptions
 from ptmtools.parallel import Workers
 from ptmtools.pipeline.artifacts import Run
 from ptmtools.pipeline.build import build_scene, run_stage
@@ -22,6 +23,7 @@ from ptmtools.store.writer import DatabaseWriter
 from ptmtools.texture import read_image
 from ptmtools.texture.images.bare import bare
 
+DARK = LightOptions("none")
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 
 
@@ -67,7 +69,7 @@ def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> No
     for count, least in ((1, 8), (2, 1), (2, 10**9)):
         monkeypatch.setattr(parallel, "WORTH_A_PROCESS", least)
         db = tmp_path / f"{count} {least}"
-        build_scene(TWO_ROOMS, db, workers=count)
+        build_scene(TWO_ROOMS, db, DARK, workers=count)
         actual[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
     one, *others = actual.values()
     assert all(other == one for other in others)
@@ -86,13 +88,13 @@ def test_a_note_says_what_max_side_leaves_and_what_more_would_cost(tmp_path: Pat
 
 def tasks(db: Path) -> tuple[int, int, int] | None:
     """How many textures a build has, keeps and takes over."""
-    (report,) = (s for s in build_scene(TWO_ROOMS, db).stages if s.stage == "textures")
+    (report,) = (s for s in build_scene(TWO_ROOMS, db, DARK).stages if s.stage == "textures")
     return report.tasks
 
 
 def test_what_levels_show_outlasts_a_resumed_and_an_updated_build(tmp_path: Path) -> None:
     """It is kept with the texture: one that is not encoded again still has it."""
-    build_scene(TWO_ROOMS, tmp_path / "whole")
+    build_scene(TWO_ROOMS, tmp_path / "whole", DARK)
     wanted = json.loads((tmp_path / "whole/www/hints.json").read_text())["textures"]
     assert all(len(row["differences"]) == len(row["ends"]) > 1 for row in wanted)
     assert all(row["differences"][0] == 0 < max(row["differences"]) for row in wanted)
