@@ -40,11 +40,17 @@ def clean(khronos: Any, database: Path, remarks: set[str]) -> int:
     actual = khronos.validate(www / "gltf")
     cells = json.loads((www / "hints.json").read_text())["cells"]
     assert sorted(actual) == sorted(f"{cell['name']}.glb" for cell in cells)
-    assert {name: file.complaints for name, file in actual.items() if file.complaints} == {}
+    for name, file in actual.items():
+        # The validator knows no AVIF, of which lightmaps are.
+        images = unpack((www / "gltf" / name).read_bytes())[0].get("images", ())
+        lossy = [n for n, image in enumerate(images) if image["uri"].endswith(".avif")]
+        unknown = tuple(f"IMAGE_UNRECOGNIZED_FORMAT /images/{n}:" for n in lossy)
+        assert [k for k in file.complaints if not k.startswith(unknown)] == []
     assert set().union(*(file.remarks for file in actual.values())) <= remarks
     for cell in cells:  # every image was fetched
         record = json.loads((www / f"hints/{cell['name']}.json").read_text())
-        assert actual[f"{cell['name']}.glb"].images >= len(record["textures"][0])
+        file = actual[f"{cell['name']}.glb"]
+        assert file.images + len(file.complaints) >= len(record["textures"][0])
     return sum(file.triangles for file in actual.values())
 
 
@@ -79,7 +85,7 @@ def test_lit_rooms(khronos: Any, ptm: Any, tmp_path: Path) -> None:
     model, db = ROOT / "sample_data/two_rooms/two_rooms.obj", tmp_path / "db"
     light = ["--light", "bake", "--light-samples", "4", "--light-density", "4"]
     assert ptm("build-scene", model, "-o", db, "--plain-gltf", *light).status == 0
-    remarks = REMARKS | {"UNUSED_OBJECT", "IMAGE_NPOT_DIMENSIONS"}
+    remarks = REMARKS | {"UNUSED_OBJECT", "IMAGE_NPOT_DIMENSIONS", "UNSUPPORTED_EXTENSION"}
     assert clean(khronos, db, remarks) == counts(db)["triangles"] > 0
     shared = 0
     for file in (db / "www/gltf").iterdir():
