@@ -1,8 +1,8 @@
 """The experiment of baked light: what clients look up in lightmaps, beside the light at points.
 
 The reference is the light by far more rays, and of all lamps, at random points of the surfaces of a
-few cells, without texels, smoothing, codes and lossy images. What is covered, as a wall by a
-picture, does not count: lightmaps have the light of the neighbours there.
+few of the largest cells, without texels, smoothing, codes and lossy images. What is covered, as a
+wall by a picture, does not count: lightmaps have the light of the neighbours there.
 
 The error is the mean of the relative differences of luminance: light spans many stops, of which the
 eye judges ratios. Light of less than `DIM` of the usual one counts as this: no client shows what is
@@ -37,7 +37,7 @@ from ptmtools_lab.tradeoff.experiment import (
     time_work,
 )
 
-#: Cells that stand for all, and points of each.
+#: Cells that stand for all, the largest, and points of each.
 TRIED, POINTS = 4, 2_000
 #: Rays of the reference.
 MOST = 4_096
@@ -57,10 +57,11 @@ def prepare_lightmaps(subject: Subject, limit: int = MOST) -> Experiment:
         return pieces_of(geometry, artifacts[CELLS], unlit, 1 / density, replaced)
 
     fine = pieces(options.light_density)
-    lit = [n for n, piece in enumerate(fine) if not piece.glass.all()]
-    chosen = np.unique(np.linspace(0, len(lit) - 1, min(TRIED, len(lit))).astype(int)).tolist()
+    # Small ones may be gaps that nobody sees.
+    size = np.array([areas(p.corner[~p.glass].astype(np.float64)).sum() for p in fine])
+    chosen = [n for n in np.argsort(-size, kind="stable")[:TRIED].tolist() if size[n] > 0]
     baking = light_baking(artifacts, options, None, lights, fine)
-    return lightmap_experiment(baking, pieces, [lit[n] for n in chosen], limit)
+    return lightmap_experiment(baking, pieces, chosen, limit)
 
 
 def lightmap_experiment(
@@ -116,12 +117,15 @@ def lightmap_experiment(
             },
         )
 
-    values = {"density": (2.5, 5.0, 10.0, 20.0), "samples": (4, 8, 16, 32, 64, 256)}
     settings = [
-        Setting(f"--light-{name} {value:g}", {f"light_{name}": value}, name)
-        for name, some in values.items()
-        for value in some
-        if name != "samples" or value < limit
+        Setting(f"--light-density {n:g}", {"light_density": n}, "density")
+        for n in (2.5, 5.0, 10.0, 20.0)
+    ]
+    # Rays do not change the bytes.
+    settings += [
+        Setting(f"--light-samples {n}", {"light_samples": n})
+        for n in (4, 8, 16, 32, 64, 256)
+        if n < limit
     ]
     return Experiment(
         f"bytes of the lightmaps of {len(cells)} cells",
