@@ -42,17 +42,17 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (66_490, 331),
+    "ptmtools": (66_900, 330),
     "ptmtools/*.py": (4_130, 26),
     "ptmtools/cells": (7_990, 26),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
-    "ptmtools/light": (2_375, 12),
+    "ptmtools/light": (2_520, 12),
     "ptmtools/meshopt": (870, 5),
-    "ptmtools/output": (7_760, 39),
-    "ptmtools/pipeline": (3_680, 19),
+    "ptmtools/output": (7_830, 39),
+    "ptmtools/pipeline": (3_780, 19),
     "ptmtools/portal_flow": (1_680, 8),
-    "ptmtools/rendering": (1_770, 13),
+    "ptmtools/rendering": (1_650, 12),
     "ptmtools/scene": (9_520, 47),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
@@ -61,9 +61,9 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/texture": (10_050, 44),
     "ptmtools/tour": (1_250, 8),
     "ptmtools/visibility": (960, 6),
-    "ptmtools_lab": (11_260, 50),
+    "ptmtools_lab": (11_640, 51),
     "ptmtools_samples": (8_740, 58),
-    "ptmtools_systems": (7_684, 50),
+    "ptmtools_systems": (8_060, 52),
 }
 #: Functions of a package that are named by a participle, and by a preposition.
 NAMES: dict[str, tuple[int, int]] = {
