@@ -4,10 +4,10 @@ The reference is the light by far more rays, and of all lamps, at random points 
 few of the largest cells, without texels, smoothing, codes and lossy images. What is covered, as a
 wall by a picture, does not count: lightmaps have the light of the neighbours there.
 
-The error is the mean of the relative differences of luminance: light spans many stops, of which the
-eye judges ratios. Light of less than `DIM` of the usual one counts as this: no client shows what is
-below. (The root mean square, linear or of logarithms, is that of the few points beside a lamp, or
-in the darkest corners.)
+The error is the mean difference of luminance in stops, |log2 (a / b)|: the eye judges ratios, and a
+few points in hidden corners that are 40 times as bright as they should be do not outweigh all
+others, as in the mean of relative differences and in root mean squares. Light of less than `DIM` of
+the usual one counts as this.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def lightmap_experiment(
         shown = np.concatenate(
             [_shown_light(light, image, piece, *place) for light, image, piece, place in rows]
         )
-        off = np.abs(np.maximum(luminance(shown), least) / truth - 1)
+        off = np.abs(np.log2(np.maximum(luminance(shown), least) / truth))
         return Measurement(
             seconds=seconds,
             work=float(sum(map(len, images))),
@@ -129,11 +129,11 @@ def lightmap_experiment(
     ]
     return Experiment(
         f"bytes of the lightmaps of {len(cells)} cells",
-        "mean relative error of luminance",
+        "mean difference of luminance, stops",
         settings if cells else [],
         measure,
-        float(np.abs((first - second) / truth).mean() / 2) if cells else 0.0,
-        units={"work": "B"},
+        float(np.abs(np.log2(first / second)).mean() / 2) if cells else 0.0,
+        units={"work": "B", "error": "stops"},
     )
 
 

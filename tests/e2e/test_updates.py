@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "benchmarks")]
 from kills import Trial  # noqa: E402
 
-QUICK = ("--samples", 4, "-j", 1)
+QUICK = ("--samples", 4, "-j", 1, "--light", "none")
 
 
 def built(ptm: Ptm, model: Path, db: Path, *more: object) -> dict[str, Any]:

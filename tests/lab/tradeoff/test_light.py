@@ -26,8 +26,8 @@ def test_more_texels_and_rays_are_nearer_to_the_light(two_rooms: Path) -> None:
     assert 0 < experiment.reference_error < many.error < few.error - 0.005
     assert few.more["texels"] == many.more["texels"]
     assert coarse.error > 2 * fine.error
-    assert fine.error < 0.05
-    assert fine.worst < 0.2
+    assert fine.error < 0.07
+    assert fine.worst < 0.25
     assert (coarse.work, coarse.more["texels"]) < (fine.work, fine.more["texels"])
 
 
