@@ -30,6 +30,7 @@ from ptmtools.light.lightmap import SMOOTH, TexelGrid, vertex_light
 from ptmtools.light.looks import SMALLEST, Look, PaintedLight, planes
 from ptmtools.light.model import CellSurfaces, light_codes
 from ptmtools.light.occlusion import normals
+from ptmtools.light.options import RANGES
 from ptmtools.scene.colors import encode_srgb, luminance
 
 if TYPE_CHECKING:
@@ -285,8 +286,9 @@ def expected_bytes(pieces: Sequence[CellSurfaces], density: float) -> float:
 
 def affordable_density(pieces: Sequence[CellSurfaces], density: float, images: int) -> float:
     """The texels to the metre of lightmaps beside images of a number of bytes (`round_bytes`), at
-    most ``density``; 0 if there is no surface for light."""
+    most ``density``; 0 if there is no surface for light, or too much of it for the options."""
     cost = expected_bytes(pieces, density)
     if cost < _SMALLEST * _TEXEL_BYTES:
         return 0.0
-    return density * min(1.0, math.sqrt(max(SHARE * images, BYTES) / cost))
+    reached = density * min(1.0, math.sqrt(max(SHARE * images, BYTES) / cost))
+    return reached if reached >= RANGES["light_density"][0] else 0.0

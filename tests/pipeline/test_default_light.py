@@ -55,7 +55,8 @@ def test_lightmaps_fit_the_images() -> None:
     )
     assert affordable_density(pieces, 10.0, 1 << 30) == 10.0
     assert affordable_density([floor(10.0)], 10.0, 0) == 10.0
-    assert affordable_density([floor(1e-5)], 10.0, 1 << 20) == 0
+    for side in (1e-5, 1e6):
+        assert affordable_density([floor(side)], 10.0, 1 << 20) == 0
     assert (
         affordable_density([floor(10.0, glass=True), floor(10.0, dense=True)], 10.0, 1 << 30) == 0
     )
