@@ -81,6 +81,7 @@ def test_a_package_becomes_a_database(put: Put, tmp_path: Path) -> None:
     (tmp_path / "maps/brick.png").unlink()
     db = tmp_path / "rooms.db"
     model = str(tmp_path / "rooms.usdz")
-    assert main(["-q", "build-scene", model, "-o", str(db), "-j", "1", "--two-sided"]) == 0
+    options = ["-j", "1", "--two-sided", "--light", "none"]
+    assert main(["-q", "build-scene", model, "-o", str(db), *options]) == 0
     assert [file.name for file in (db / "www/textures").glob("*.ptm")] == ["brick.ptm"]
     assert main(["-q", "validate", str(db)]) == 0
