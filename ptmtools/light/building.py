@@ -140,13 +140,12 @@ class GatheredLight:
 
     def indirect(
         self, face: Ints, point: Floats, turn: Floats, times: int = 1
-    ) -> tuple[Singles, Singles]:
-        """(n, 3) the light of the sky and of surfaces at points of faces, NaN where covered, by so
-        many times the usual number of rays; (n,) the variance of the mean of its colours."""
+    ) -> tuple[Singles, Singles, Bools]:
+        """(n, 3) the light of the sky and of surfaces at points of faces, by so many times the
+        usual number of rays; (n,) the variance of the mean of its colours; (n,) what is covered."""
         field, samples = self.building.field, times * self.samples
         light, blocked, variance = field.gather(point, self.normal[face], turn, samples, self.near)
-        light[blocked > _COVERED] = np.nan
-        return light, variance
+        return light, variance, blocked > _COVERED
 
     def direct(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         """(n, 3) the light of lamps."""
@@ -155,7 +154,10 @@ class GatheredLight:
         return light.astype(np.float32)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        return self.indirect(face, point, turn)[0] + self.direct(face, point, turn)
+        light, _, covered = self.indirect(face, point, turn)
+        light += self.direct(face, point, turn)
+        light[covered] = np.nan
+        return light
 
 
 class BuildingBaking:

@@ -194,16 +194,18 @@ class LightBaking:
             return np.repeat(look(grid.face, point, turn), 3, axis=1)
         near = 0.5 * grid.texel
         lit = self.building.look(corner[rows], side[rows], self.options.light_samples, near)
-        light, variance = lit.indirect(grid.face, point, turn)
+        light, variance, covered = lit.indirect(grid.face, point, turn)
         # What few rays meet, as a window far away, is missed by most of the texels around.
-        bright = np.nan_to_num(light).mean(axis=1) + _DIM * self.building.usual
+        bright = light.mean(axis=1) + _DIM * self.building.usual
         grainy = np.flatnonzero(grid.blur(variance) > (_GRAIN * bright) ** 2)
-        more, rest = lit.indirect(
+        more, rest, _ = lit.indirect(
             grid.face[grainy], point[grainy], (turn[grainy] + _AGAIN) % 1.0, _MORE
         )
         share = np.float32(_MORE / (_MORE + 1))
         light[grainy] += share * (more - light[grainy])
         variance[grainy] = rest * share
+        # A gap narrower than a texel, all of which is covered, has the light that it has.
+        light[covered & grid.is_in_chart_of(~covered)] = np.nan
         indirect = grid.smooth(light, variance, _LEAST * self.building.usual)
         return np.asarray(indirect + lit.direct(grid.face, point, turn), np.float32)
 

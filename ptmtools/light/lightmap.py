@@ -100,6 +100,11 @@ class TexelGrid:
             value, grain = smooth(value, blur(grain, chart), chart, step, least, _SPLINE)
         return np.where(covered[:, None], np.nan, value[self.row, self.column])
 
+    def is_in_chart_of(self, chosen: Bools) -> Bools:
+        """(n,) whether one of the (n,) chosen texels is in the chart of each."""
+        chart = self.chart[self.row, self.column]
+        return np.asarray(np.isin(chart, chart[chosen]))
+
     def blur(self, variance: Singles) -> Singles:
         """(n,) the mean of (n,) variances over the texels around in each chart."""
         grain = np.zeros(self.chart.shape, np.float32)

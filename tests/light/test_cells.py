@@ -149,6 +149,15 @@ def test_a_picture_does_not_darken_the_wall_around_it() -> None:
     assert covered == pytest.approx(bare, rel=0.15)
 
 
+def test_a_gap_that_is_covered_everywhere_stays_dark() -> None:
+    """The back of a board 1 cm off a wall, in a bright room."""
+    wall = quad((1, 1, 0.0), (3, 1, 0.0), (3, 2, 0.0), (1, 2, 0.0))
+    board = quad((1, 1, 0.01), (1, 2, 0.01), (3, 2, 0.01), (3, 1, 0.01))
+    shown = np.concatenate([wall, board, room()[:2] + [0, 0, 0.5]])
+    result = baked(shown, around=room()[2:])
+    assert at(result, 4, MIDDLE) > 10 * at(result, 2, MIDDLE)
+
+
 def test_dense_objects_have_light_at_vertices() -> None:
     side = 64
     x, y = np.meshgrid(np.arange(side) / 10, np.arange(side) / 10, indexing="ij")

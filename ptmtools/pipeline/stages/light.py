@@ -239,6 +239,17 @@ def _notes(lights: list[CellLight]) -> Iterator[str]:
         )
 
 
+def _notes_on_size(pieces: list[CellSurfaces]) -> Iterator[Warned]:
+    """The note on a model with surfaces, but none that lightmaps have texels for."""
+    from ptmtools.light.cells import expected_bytes
+
+    if expected_bytes(pieces, 1.0):
+        yield Warned(
+            "there is no light: the surfaces of the model are too small or too large for "
+            "lightmaps; check --unit, or use --light bake with --light-density"
+        )
+
+
 def lightmap_files(light: Light | None) -> dict[int, str]:
     """Cell → `.ptm` of its lightmap, relative to the served folder."""
     sides = [] if light is None else light.side.tolist()
@@ -318,7 +329,7 @@ class LightStage(Stage["Light"]):
         if options.light == "auto" and not model_light:
             density = affordable_density(pieces, asked, round_bytes(image_bytes(run)))
             if not density:
-                return complete(work, _NO_LIGHT, ())
+                return complete(work, _NO_LIGHT, _notes_on_size(pieces))
             options = replace(options, light_density=density)
         if options.light == "auto" and (fault := _absence()):
             left_out = f"lightmaps are left out: {fault.message}"
