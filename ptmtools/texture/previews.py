@@ -79,7 +79,8 @@ FORMATS: Mapping[str, PreviewFormat] = {
         "image/avif",
         65536,
         True,
-        {"speed": 8},
+        # The number of threads changes the bytes.
+        {"speed": 8, "max_threads": 1},
     ),
     JPEG: PreviewFormat(
         "read by everything; twice the bytes", ".jpg", "image/jpeg", 65500, False, {}

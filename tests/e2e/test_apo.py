@@ -33,8 +33,8 @@ def museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("apo")
     model = make_museum(folder / "model", rooms=2)
     for name, options in (("plain", ()), ("light", APO)):
-        words = ["-o", folder / name, "--samples", 16, "--backend", "embree", *options]
-        assert main(["-q", "build-scene", str(model), *map(str, words)]) == 0
+        words = ["-o", folder / name, "--samples", 16, "--backend", "embree", "--light", "none"]
+        assert main(["-q", "build-scene", str(model), *map(str, [*words, *options])]) == 0
     return folder
 
 

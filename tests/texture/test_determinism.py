@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, decode, encode
+from ptmtools.texture.previews import AVIF, image_bytes
 
 PROFILES = ("raw", "fast", "small")
 
@@ -77,3 +78,16 @@ def test_elsewhere(here: dict[str, str], environment: dict[str, str], threads: i
 
 if __name__ == "__main__":
     print(json.dumps(digests(int(sys.argv[1]))))
+
+
+def test_avif_does_not_depend_on_the_number_of_processors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plugin = pytest.importorskip("PIL.AvifImagePlugin")
+    coarse = np.random.default_rng(1).integers(0, 256, (15, 15, 3), np.uint8)
+    texels = coarse.repeat(16, axis=0).repeat(16, axis=1)
+    results = set()
+    for threads in (1, 2, 4):
+        monkeypatch.setattr(plugin, "_get_default_max_threads", lambda count=threads: count)
+        results.add(image_bytes(texels, AVIF, 85))
+    assert len(results) == 1
