@@ -149,7 +149,7 @@ class GatheredLight:
 
     def direct(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         """(n, 3) the light of lamps."""
-        around, rays = self.building.field.around, max(1, self.samples // 8)
+        around, rays = self.building.field.around, max(1, self.samples // 16)
         light = direct_light(around, self.lamps, point, self.normal[face], turn, rays)
         return light.astype(np.float32)
 

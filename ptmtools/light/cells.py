@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 #: Rays from a point of a face with light at vertices, of those from a texel: a vertex has the light
 #: of many points.
-_AT_VERTICES = 0.25
+_AT_VERTICES = 0.125
 #: The least light of the model's own lightmaps.
 _PAINTED = 0.15
 #: Texels among whose neighbours the deviation is more than this share of their light, beside this
