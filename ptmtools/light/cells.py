@@ -244,7 +244,8 @@ def _exposure(radiance: Floats, weight: Floats) -> tuple[float, float]:
         return 0.0, 0.0
     order = shows[np.argsort(radiance[shows], kind="stable")]
     total = np.cumsum(weight[order])
-    mean = float(weight[order] @ np.log(radiance[order])) / float(total[-1])
+    # No dot product: its rounding follows the number of threads.
+    mean = float((weight[order] * np.log(radiance[order])).sum()) / float(total[-1])
     bright = radiance[order[np.searchsorted(total, _HIGH * total[-1])]]
     return min(math.log(_KEY) - mean, math.log(_MOST_OF_WHITE / bright)), float(total[-1])
 

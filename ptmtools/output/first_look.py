@@ -146,7 +146,8 @@ def steps_of(record: TextureRecord, side: int) -> list[LevelStep]:
     # The mean colour is known before any level, so the first level gains nothing.
     corners = [(-1, 0, 0.0)]
     for n, (level, gain) in enumerate(
-        zip(record.levels, accumulate(record.detail.differences), strict=True)
+        # A lossy source has further levels, which are no part of the `.ptm`.
+        zip(record.levels, accumulate(record.detail.differences), strict=False)
     ):
         if max(level.width, level.height) > side:
             break

@@ -214,12 +214,12 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
     standing = area * (cells.standing if (area * cells.standing).any() else 1)
     if not standing.any():
         return 1.0, np.ones(len(area))
-    usual = float(standing @ wanted / standing.sum())
+    usual = float((standing * wanted).sum() / standing.sum())
     total, weight = wanted * area, area.copy()
     for cell, near in enumerate(cells.adjacent()):
         # A large hall beside a small room is seen through a door.
         beside = np.minimum(area[near], area[cell]) / 4
-        total[cell] += wanted[near] @ beside
+        total[cell] += (wanted[near] * beside).sum()
         weight[cell] += beside.sum()
     wished = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
     return math.exp(usual), np.exp(np.clip(wished - usual, -_MOST_STOPS, _MOST_STOPS))
