@@ -44,7 +44,7 @@ SKY, BLUE, OF_SUN = 1000.0, np.array([0.89, 1.0, 1.22]), 0.2
 #: Reflectance of the ground.
 GROUND = 0.3
 #: Radiance of ceilings that glow, as a share of `SKY`, and its colour.
-CEILING, WARM = 0.06, np.array([1.15, 1.0, 0.85])
+CEILING, WARM = 0.06, np.array([1.04, 1.0, 0.94])
 #: A ceiling is this far above what is below it, metres, or this share of the highest, if that is
 #: less; and its normal points down with this cosine.
 _OVER, _OF_HIGHEST, _DOWN = 2.2, 0.6, 0.9
