@@ -160,7 +160,11 @@ def test_a_closed_box_stays_dark() -> None:
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("candela", [1e-6, 1e9])
-def test_extremes_give_numbers(scale: float, candela: float) -> None:
+def test_extremes_give_numbers(
+    scale: float, candela: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ptmtools.light.building.MOST", 4000)
+    monkeypatch.setattr("ptmtools.light.cells._LARGEST", 64)
     corner = windowed() * scale
     shown = piece(corner)
     lamp = Lamp("point", (3 * scale, 2.5 * scale, 3 * scale), intensity=candela)
