@@ -79,8 +79,7 @@ FORMATS: Mapping[str, PreviewFormat] = {
         "image/avif",
         65536,
         True,
-        # The number of threads changes the bytes.
-        {"speed": 8, "max_threads": 1},
+        {"speed": 8, "max_threads": 1},  # threads change the bytes
     ),
     JPEG: PreviewFormat(
         "read by everything; twice the bytes", ".jpg", "image/jpeg", 65500, False, {}
