@@ -155,8 +155,7 @@ def transport(
             radiance[part] = reflected[part] * (direct[part] + light[part]) + emitted[part]
         if turn >= passes - counted:
             total += light
-        # No dot product: its rounding follows the number of threads.
-        sums.append(float((area * light.mean(axis=1)).sum()))
+        sums.append(float((area * light.mean(axis=1)).sum()))  # a dot product follows the threads
         if turn == passes - counted - 1:
             radiance[:] = reflected * (direct + extrapolation(sums) * light) + emitted
     radiance[:] = reflected * (direct + total / counted) + emitted
