@@ -141,8 +141,8 @@ class GatheredLight:
     def indirect(
         self, face: Ints, point: Floats, turn: Floats, times: int = 1
     ) -> tuple[Singles, Singles, Bools]:
-        """(n, 3) the light of the sky and of surfaces at points of faces, by so many times the
-        usual number of rays; (n,) the variance of the mean of its colours; (n,) what is covered."""
+        """(n, 3) the light of the sky and of surfaces at points of faces, by ``times`` the usual
+        number of rays; (n,) the variance of the mean of its colours; (n,) what is covered."""
         field, samples = self.building.field, times * self.samples
         light, blocked, variance = field.gather(point, self.normal[face], turn, samples, self.near)
         return light, variance, blocked > _COVERED

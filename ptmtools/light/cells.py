@@ -42,7 +42,7 @@ _AT_VERTICES = 0.125
 #: The least light of the model's own lightmaps.
 _PAINTED = 0.15
 #: Texels among whose neighbours the deviation is more than this share of their light, beside this
-#: share of the usual light, have so many times more rays, turned by this part of a turn.
+#: share of the usual light, have this multiple of rays more, turned by this part of a turn.
 _GRAIN, _DIM, _MORE, _AGAIN = 0.25, 0.1, 3, 0.381966
 #: Differences of light by this share of the usual one do not show.
 _LEAST = 0.01

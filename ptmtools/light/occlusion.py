@@ -1,11 +1,8 @@
-"""The light at a point: ambient occlusion by rays of Embree, and points spread over surfaces.
+"""The surfaces that occlude, rays of Embree among them, and points and directions spread evenly.
 
-Rays go out into the hemisphere over a point, denser by the cosine of their angle to the normal, and
-the light is the share of them that escape. The directions are a Hammersley set, turned about the
-normal by an angle of each point's own, so that the error of few rays is a grain and not bands. All
-opaque faces and a level ground under the scene occlude. A ray with a hit at distance d counts
-d / reach, and 1 beyond (ambient obscurance, Zhukov, Iones and Kronin 1998): with plain occlusion,
-``reach`` inf, rooms are black.
+Directions over a point are denser by the cosine of their angle to the normal: a Hammersley set,
+turned about the normal by an angle of each point's own, so that the error of few rays is a grain
+and not bands.
 
 Embree computes in float32. Its tree is built around the middle of the scene, and rays begin as far
 above a surface as the scene's tolerance for planes.

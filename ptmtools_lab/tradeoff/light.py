@@ -57,7 +57,7 @@ def prepare_lightmaps(subject: Subject, limit: int = MOST) -> Experiment:
         return pieces_of(geometry, artifacts[CELLS], unlit, 1 / density, replaced)
 
     fine = pieces(options.light_density)
-    # Small ones may be gaps that nobody sees.
+    # Small ones may be gaps out of sight.
     size = np.array([areas(p.corner[~p.glass].astype(np.float64)).sum() for p in fine])
     chosen = [n for n in np.argsort(-size, kind="stable")[:TRIED].tolist() if size[n] > 0]
     baking = light_baking(artifacts, options, None, lights, fine)

@@ -2,7 +2,7 @@
 // ground around the building (docs/formats/hints.md#colours).
 
 /** Seconds in which the exposure nearly reaches that of another cell, metres of a frame that are a jump, and a
- * share of the exposure that nobody sees. */
+ * share of the exposure that does not show. */
 const EASE = 0.2, JUMP = 1, UNSEEN = 0.01;
 
 /** Linear light of colours as sRGB encodes them (IEC 61966-2-1), here and below to 0.1 of 255: powers would double

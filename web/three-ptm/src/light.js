@@ -16,7 +16,7 @@ import { BufferAttribute, BufferGeometry, Mesh, ShaderMaterial } from "three";
  */
 /** @typedef {{value: number}} Exposure a uniform */
 
-/** Seconds in which the exposure nearly reaches another one, and a share of it that nobody sees. */
+/** Seconds in which the exposure nearly reaches another one, and a share of it that does not show. */
 const EASE = 0.2, UNSEEN = 0.01;
 
 /** Linear light that a screen can show. @param {string} tone */
