@@ -100,6 +100,11 @@ class Material:
     metallic: float = 0.0
     roughness: float = 1.0
 
+    @property
+    def glossy(self) -> bool:
+        """Whether it reflects what has a shape: in what is rougher, no metal, none can be seen."""
+        return self.metallic > 0 or self.roughness < 0.8
+
 
 @dataclass(frozen=True)
 class SourceImage:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ptmtools.scene import IngestOptions, Scene, images, ingest
+from ptmtools.scene.model import Material
 from ptmtools.texture.images.png import png_bytes
 from tests.scene.conftest import GltfModel, Put, png
 
@@ -201,3 +202,12 @@ def test_images_are_read_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None
     scene = ingest(put("shared.glb", GltfModel.wall(change).glb()))
     assert [m.roughness for m in scene.materials] == pytest.approx([0.2, 0.1])
     assert len(lengths) == 1
+
+
+@pytest.mark.parametrize(
+    ("metallic", "roughness", "glossy"), [(0.1, 1, True), (0, 0.79, True), (0, 0.8, False)]
+)
+def test_metals_and_what_is_smooth_are_glossy(
+    metallic: float, roughness: float, glossy: bool
+) -> None:
+    assert Material("brass", metallic=metallic, roughness=roughness).glossy == glossy
