@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, areas, sum_by_group
 from ptmtools.jit import inlined_kernel, kernel
+from ptmtools.light.looks import SMALLEST
 from ptmtools.light.occlusion import RAYS, Occluders, normals, points_on, spread_over
 from ptmtools.scene.colors import luminance
 from ptmtools.scene.lights import KINDS, Lights
@@ -73,6 +74,20 @@ class Lamps:
     def only(self, chosen: Bools | Ints) -> Lamps:
         """Some of them."""
         return Lamps(*(values[chosen] for values in vars(self).values()))
+
+    def arrival(self, point: Floats, size: float) -> tuple[Floats, Floats, Floats]:
+        """(n, 3) directions in which (3,) a point sees lamps without a surface, (n,) the light from
+        each, square to its direction, and (n, 3) where it comes from, of suns this far away."""
+        sun = self.kind == _SUN
+        to = np.where(sun[:, None], -size * self.way, self.place - point)
+        distance = np.linalg.norm(to, axis=1)
+        to = to / np.maximum(distance, SMALLEST)[:, None]
+        edge = -np.einsum("nx,nx->n", to, self.way) - self.cone[:, 1]
+        edge = np.clip(edge / np.maximum(self.cone[:, 0] - self.cone[:, 1], _SHARPEST), 0, 1)
+        spread = (
+            np.where(self.kind == _SPOT, edge * edge, 1.0) / np.maximum(distance, _NEAREST) ** 2
+        )
+        return to, self.power * np.where(sun, 1.0, spread), point + to * distance[:, None]
 
     def groups(self) -> tuple[Bools, Bools, Bools]:
         """(n,) which are points and spots, suns, and surfaces."""
@@ -228,8 +243,7 @@ def _light_with_shadows(
         lamp = chosen[row, column]
         target = lamps.place[lamp]
         sun = lamps.kind[lamp] == _SUN
-        size = 2 * np.linalg.norm(around.points.max(axis=0) - around.points.min(axis=0), axis=-1)
-        target[sun] = origin[row[sun]] - size * lamps.way[lamp[sun]]
+        target[sun] = origin[row[sun]] - around.size * lamps.way[lamp[sun]]
         free = around.free(origin[row], target)
         # Of each colour the part that is free: without shadows the light is exact.
         sent = times[row, column, None] * lamps.color[lamp]

@@ -69,6 +69,9 @@ class Light:
         vertices.
     horizon: (2, 3) radiance of the sky and of the ground.
     shine: (M, 3) the linear colours, of 1 at most, that materials have that are lamps; 0 of others.
+    reflects: (S,) whether a shape shows the probe of its cell.
+    probe: (C, 11) of each cell white and mean, centre and the corners of the box, see `Probe`; 0
+        without one.
     toned: whether the light shows by a tone curve; else it is the model's own, of 1 at most.
     """
 
@@ -81,6 +84,8 @@ class Light:
     vertex: NDArray[np.uint8]
     horizon: Floats
     shine: Floats
+    reflects: Bools
+    probe: Floats
     toned: bool = True
 
     def display(self) -> dict[str, Any]:
@@ -120,5 +125,7 @@ class Light:
             stored.array("vertex", np.uint8, len(uv), 3, 3),
             stored.array("horizon", np.float64, 2, 3, finite=True),
             stored.array("shine", np.float64, None, 3, finite=True),
+            stored.array("reflects", np.bool_, len(mapped)),
+            stored.array("probe", np.float64, len(side), 11, finite=True),
             bool(stored.array("toned", np.bool_, 1)[0]),
         )

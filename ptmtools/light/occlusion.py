@@ -62,6 +62,12 @@ class Occluders:
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "tree"}
 
+    @property
+    def size(self) -> float:
+        """Metres beyond which nothing is, from any point of a surface."""
+        across = self.points.max(axis=0) - self.points.min(axis=0)
+        return float(2 * np.linalg.norm(across, axis=-1))
+
     @cached_property
     def tree(self) -> Any:
         """Embree's tree; None without faces."""

@@ -63,7 +63,7 @@ class TexturePlaces:
     Attributes
     ----------
     of_image: by the image of the scene.
-    of_cell: of the lightmap of each cell.
+    of_cell, probe: of the lightmap and of the probe of each cell.
     of_object: of the normal map of each object.
     """
 
@@ -73,6 +73,7 @@ class TexturePlaces:
             r.image: (i, r) for i, r in placed if r.image >= 0
         }
         self.of_cell: dict[int, PlacedTexture] = {r.cell: (i, r) for i, r in placed if r.cell >= 0}
+        self.probe: dict[int, PlacedTexture] = {r.probe: (i, r) for i, r in placed if r.probe >= 0}
         self.of_object: dict[int, PlacedTexture] = {
             r.object: (i, r) for i, r in placed if r.object >= 0
         }
@@ -84,7 +85,7 @@ class Content:
     Attributes
     ----------
     textures: in the order of the hints; one for every image that a material in use names, and then
-        the lightmaps of cells, and the normal maps of objects.
+        the lightmaps and the probes of cells, and the normal maps of objects.
     viewpoints: where a walk may start.
     emitters: the forms that are written, in the order of writing.
     """
@@ -175,8 +176,8 @@ class Content:
         of_maps = np.split(map_place[self.geometry.object], start)
         painted = []
         for cell, rows in enumerate(zip(of_shapes, of_maps, strict=True)):
-            lightmap, _ = places.of_cell.get(cell, (-1, None))
-            used = np.unique(np.concatenate([*rows, [lightmap]]))
+            light = [kind.get(cell, (-1, None))[0] for kind in (places.of_cell, places.probe)]
+            used = np.unique(np.concatenate([*rows, light]))
             painted.append(used[used >= 0])
         return painted
 

@@ -49,6 +49,7 @@ class Shape:
     normal: (m, 3, 2) float32 coordinates of the corners in the normal map of the material,
         likewise, if that has its own; else None.
     lit: whether it has light, in the lightmap or, as a factor of its colours, at its corners.
+    reflects: whether it shows the probe of the cell.
     """
 
     object: int
@@ -63,6 +64,7 @@ class Shape:
     relief: NDArray[np.float32] | None = None
     normal: NDArray[np.float32] | None = None
     lit: bool = False
+    reflects: bool = False
 
 
 class Geometry:
@@ -193,6 +195,7 @@ class Geometry:
             self.relief[rows] if self.relief is not None and self.relieved[s] else None,
             self.normal[rows] if self.normal is not None and self._own_normal[s] else None,
             self.light is not None and bool(self.light.lit[s]),
+            self.light is not None and bool(self.light.reflects[s]),
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:

@@ -105,13 +105,14 @@ class MaterialWriter:
         lightmap: tuple[int, TextureRecord] | None,
         white: float | None,
         reliefs: Mapping[int, tuple[int, TextureRecord]],
+        probe: int | None = None,
     ) -> None:
         """``textures``: for every image its index in the hints' list, and its record; ``lightmap``
         and ``reliefs``: the same for the lightmap of the cell, and for the normal maps of
-        objects; ``white``: see `Light`."""
+        objects; ``white``: see `Light`; ``probe``: the index of that of the cell."""
         self._scene = materials
         self._records = textures
-        self._lightmap, self._white = lightmap, white
+        self._lightmap, self._white, self._probe = lightmap, white, probe
         self._reliefs = reliefs
         self._fallback = fallback
         self._known: dict[tuple[Any, ...], int] = {}
@@ -128,19 +129,26 @@ class MaterialWriter:
         *,
         lit: bool,
         mapped: bool,
+        reflects: bool = False,
         relief: int | None = None,
         normal: int | None = None,
     ) -> int:
         """The index of a scene's material, seen from one side or from both; of a coarsest mesh with
-        finer ones, its row in the hints is ``mesh``. ``lit``, ``mapped``: whether it has light, and
-        in the lightmap; ``relief``: the object whose normal map it has; ``normal``: the number of
-        the coordinates in its own."""
-        key = material, two_sided, mesh, lit, mapped, relief, normal
+        finer ones, its row in the hints is ``mesh``. ``lit``, ``mapped``, ``reflects``: whether it
+        has light, and in the lightmap, and shows the probe; ``relief``: the object whose normal map
+        it has; ``normal``: the number of the coordinates in its own."""
+        key = material, two_sided, mesh, lit, mapped, reflects, relief, normal
         place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
             row = self._material(self._scene[material], two_sided, mesh)
             if lit:
                 row["extras"] = row.get("extras", {}) | {"white": self._white}
+            if reflects:
+                row["extras"] = row.get("extras", {}) | {"probe": self._probe}
+                if not lit:
+                    # Panes whose roughness is not stated are smooth.
+                    rough = self._scene[material].roughness
+                    row["pbrMetallicRoughness"]["roughnessFactor"] = rough if rough < 1 else 0
             if mapped:
                 assert self._lightmap
                 self._add(row, "light", "occlusionTexture", *self._lightmap)
@@ -322,6 +330,7 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
         lightmap,
         white,
         places.of_object,
+        places.probe[cell][0] if cell in places.probe else None,
     )
     represented = content.extras.represented
     replaced, extras = replaced_objects(represented), node_extras(represented)
@@ -338,6 +347,7 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
             place,
             lit=shape.lit,
             mapped=shape.light is not None,
+            reflects=shape.reflects,
             relief=None if shape.relief is None else shape.object,
             normal=normal,
         )

@@ -40,6 +40,7 @@ from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
+    from ptmtools.light.model import Light
     from ptmtools.output.content import Content
     from ptmtools.output.first_look import BundlePiece
     from ptmtools.output.mesh_levels import MeshLevels
@@ -85,6 +86,7 @@ def index_text(content: Content) -> str:
         "textures": [
             _texture(r, content.scene.objects, content.options.fallback)
             | ({"normals": True} if r.image in normal_maps else {})
+            | ({"probe": _probe(light, r.probe)} if light and r.probe >= 0 else {})
             for r in content.textures
         ],
         **{r.kind.name: list(r.rows) for r in content.extras.represented if r.kind and r.rows},
@@ -148,6 +150,13 @@ def _texture(record: TextureRecord, objects: Sequence[str], fallback: bool) -> d
     return row
 
 
+def _probe(light: Light, cell: int) -> dict[str, Any]:
+    white, mean, *places = light.probe[cell].tolist()
+    centre, low, high = (coordinates(places[k : k + 3], "probes") for k in (0, 3, 6))
+    white, mean = significant(np.array([white, mean]))
+    return {"cell": cell, "white": white, "mean": mean, "centre": centre, "low": low, "high": high}
+
+
 def _preview(record: PreviewRecord) -> Mapping[str, Any]:
     preview = record.preview
     row: dict[str, Any] = {
@@ -199,6 +208,8 @@ def _round_down(values: NDArray[np.float64], decimals: int) -> NDArray[np.float6
 RECORD_FORMAT = "ptmtools cell"
 #: Significant digits of the need; sampling leaves two.
 NEED_DIGITS = 3
+#: The worth of a probe as a share of that of the lightmap of its cell.
+_OF_PROBES = 0.2
 
 
 class RecordWriter:
@@ -261,19 +272,18 @@ class RecordWriter:
                 if place in visible:
                     first = int(measured.first[entry])
                     rows.append([place, first, *significant(shares, NEED_DIGITS)])
-        return sorted([*rows, *self._lightmap_need(cell)])
+        return sorted([*rows, *self._light_need(cell)])
 
-    def _lightmap_need(self, cell: int) -> Iterator[list[Any]]:
-        """The need of the lightmaps of visible cells. A texel of one is so large that every view
-        requires the finest level."""
-        content = self._content
-        if not content.places.of_cell:
-            return
-        shares = significant(content.ach.value[content.ach.entries(cell)], NEED_DIGITS)
-        for seen, share in zip(content.pvs.row(cell).tolist(), shares, strict=True):
-            if share and seen in content.places.of_cell:
-                place, record = content.places.of_cell[seen]
-                yield [place, record.level_count - 1, share]
+    def _light_need(self, cell: int) -> Iterator[list[Any]]:
+        """The need of the lightmaps and probes of visible cells. A texel of one is so large that
+        every view requires the finest level."""
+        places, ach = self._content.places, self._content.ach
+        for of_cells, worth in ((places.of_cell, 1.0), (places.probe, _OF_PROBES)):
+            shares = significant(worth * ach.value[ach.entries(cell)], NEED_DIGITS)
+            for seen, share in zip(self._content.pvs.row(cell).tolist(), shares, strict=True):
+                if share and seen in of_cells:
+                    place, record = of_cells[seen]
+                    yield [place, record.level_count - 1, share]
 
     def _texture_shares(self, entry: int) -> list[list[Any]]:
         """The pairs of a texture, None for untextured surfaces, and its share of an ACH entry."""

@@ -182,6 +182,7 @@ def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> DetailLevel:
                 uv_triangle,
                 color,
                 lit=shape.lit,
+                reflects=shape.reflects,
             )
         )
     return DetailLevel(mesh.points.astype(np.float32), table, tuple(parts), error)

@@ -60,6 +60,7 @@ class TextureRecord:
     errors: root mean square of each level from the finest, 0 to 255; empty if unknown.
     previews: by ascending level; the finest may be of levels that the `.ptm` lacks.
     cell, object: the cell whose lightmap it is, or -1; the object whose normal map, or -1.
+    probe: the cell whose probe it is, or -1.
     """
 
     image: int
@@ -78,6 +79,7 @@ class TextureRecord:
     previews: tuple[PreviewRecord, ...] = ()
     cell: int = -1
     object: int = -1
+    probe: int = -1
 
     @property
     def level_count(self) -> int:

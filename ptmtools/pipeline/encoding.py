@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -27,6 +27,7 @@ from ptmtools.texture.model import EncodeOptions
 from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from ptmtools.executor import Executor
@@ -149,6 +150,17 @@ def bake_textures(
         total += len(files[0][1]) if files else 0
     run.progress(len(tasks), len(tasks), unit)
     return results, total
+
+
+def lossy_codes(texels: NDArray[np.uint8], quality: Mapping[str, int]) -> tuple[str, bytes]:
+    """The format and the image of (h, w, 3) codes of light: AVIF, or WebP where Pillow cannot write
+    it. ``quality``: of each format."""
+    from PIL import features
+
+    from ptmtools.texture.previews import image_bytes
+
+    name = "avif" if features.check("avif") else "webp"
+    return name, image_bytes(texels, name, quality[name])
 
 
 def encode_image(

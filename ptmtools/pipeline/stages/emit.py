@@ -16,6 +16,7 @@ from ptmtools.pipeline.encoding import (
     preview_file,
     stem_of,
 )
+from ptmtools.pipeline.probes import probe_files
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.cells import CELLS
@@ -43,12 +44,15 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     return read_records(run, TEXTURES, ((name, {"image": i}) for i, name in enumerate(files)))
 
 
-def lightmap_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord, ...]:
-    """The lightmaps of the cells, for the served files."""
-    files = lightmap_files(light)
-    return read_records(
-        run, LIGHT, ((name, {"image": -1, "cell": cell}) for cell, name in files.items())
+def light_records(run: Artifacts, light: Light | None) -> tuple[TextureRecord, ...]:
+    """The lightmaps and the probes of the cells, for the served files."""
+    files = {"cell": lightmap_files(light), "probe": probe_files(light)}
+    rows = (
+        (name, {"image": -1, kind: cell})
+        for kind, names in files.items()
+        for cell, name in names.items()
     )
+    return read_records(run, LIGHT, rows)
 
 
 def representing() -> tuple[Stage[Any], ...]:
@@ -159,7 +163,7 @@ class EmitStage(Stage[None]):
         represented = tuple(_representations(run))
         maps = tuple(texture for kind in represented for texture in kind.textures)
         places = object_maps(represented)
-        textures = (*images, *lightmap_records(run, light), *maps)
+        textures = (*images, *light_records(run, light), *maps)
         extras = EmitExtras(
             light=light,
             represented=represented,

@@ -18,7 +18,14 @@ from ptmtools.lazy import Lazy, component
 from ptmtools.light.options import LightOptions
 from ptmtools.output.names import cell_name
 from ptmtools.pipeline.artifacts import Artifacts, Run
-from ptmtools.pipeline.encoding import TextureOptions, bake_textures, encode_image, ptm_file
+from ptmtools.pipeline.encoding import (
+    TextureOptions,
+    bake_textures,
+    encode_image,
+    lossy_codes,
+    ptm_file,
+)
+from ptmtools.pipeline.probes import LitSurfaces, bake_probes, reflective_materials
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.scene import (
@@ -40,6 +47,7 @@ if TYPE_CHECKING:
     from ptmtools.light.cells import CellLight, LightBaking
     from ptmtools.light.looks import PaintedLight
     from ptmtools.light.model import CellSurfaces, Light
+    from ptmtools.output.geometry import Geometry
     from ptmtools.scene.lights import Lights
     from ptmtools.scene.model import Scene
     from ptmtools.store.manifest import StageRecord
@@ -75,7 +83,7 @@ def bake_cell(
     light = shared.baking.light(piece)
     if light.texels is None:
         return (light, 0), []
-    name, data = lossy_light(light.texels)
+    name, data = lossy_codes(light.texels, _QUALITY)
     files = encode_image(shared.options, f"{lightmap_stem(cell)}.{name}", data)
     return (light, sum(len(part) for file, part in files if file.startswith(f"{SERVED}/"))), files
 
@@ -83,16 +91,6 @@ def bake_cell(
 #: Quality of the images of lightmaps. (WebP 85 takes a quarter more bytes, and has blocks on smooth
 #: walls.)
 _QUALITY = {"avif": 85, "webp": 90}
-
-
-def lossy_light(texels: NDArray[np.uint8]) -> tuple[str, bytes]:
-    """The format and the image of codes, (h, w, 3): AVIF, or WebP where Pillow cannot write it."""
-    from PIL import features
-
-    from ptmtools.texture.previews import image_bytes
-
-    name = "avif" if features.check("avif") else "webp"
-    return name, image_bytes(texels, name, _QUALITY[name])
 
 
 def lightmap_stem(cell: int) -> str:
@@ -147,15 +145,19 @@ def _reflectance(artifacts: Artifacts) -> NDArray[np.float64]:
         spread = (steps.errors[0] / 255) ** 2
         curve = 2.4 * 1.4 / 1.055**2 * ((mean + 0.055) / 1.055) ** 0.4
         means.append(np.clip(to_linear(mean) + curve * spread / 2, 0, 1))
-    white = np.ones(3)
-    colors = np.array(
-        [to_linear(np.array(m.color)) * (means[m.image] if m.image >= 0 else white)
-         for m in scene.materials]
-    ).reshape(-1, 3)  # fmt: skip
+    mean = np.array([means[m.image] if m.image >= 0 else np.ones(3) for m in scene.materials])
+    return np.asarray(_tint(scene) * mean.reshape(-1, 3)[scene.triangle_material])
+
+
+def _tint(scene: Scene) -> NDArray[np.float64]:
+    """(T, 3) the colour of each face of the scene beside its image, linear light."""
+    import numpy as np
+
+    from ptmtools.scene.colors import to_linear
+
+    colors = to_linear(np.array([m.color for m in scene.materials]).reshape(-1, 3))
     result = colors[scene.triangle_material]
-    if scene.colors is not None:
-        result = result * to_linear(scene.colors / 255).mean(axis=1)
-    return result
+    return result if scene.colors is None else result * to_linear(scene.colors / 255).mean(axis=1)
 
 
 def _absence() -> MissingComponentError | None:
@@ -256,13 +258,61 @@ def lightmap_files(light: Light | None) -> dict[int, str]:
     return {cell: ptm_file(lightmap_stem(cell)) for cell, side in enumerate(sides) if side}
 
 
+def _light_of(
+    run: Run,
+    transaction: Transaction,
+    baking: LightBaking,
+    geometry: Geometry,
+    pieces: Sequence[CellSurfaces],
+    lights: Sequence[CellLight],
+    unlit: NDArray[np.bool_],
+) -> tuple[Light, int]:
+    """The light of the building with its probes, and the bytes of these. ``unlit``: (M,) the
+    materials without light."""
+    import numpy as np
+
+    from ptmtools.light.model import Light
+
+    scene, building = run[SCENE], baking.building
+    factor, exposure, probe_bytes = 1.0, np.ones(len(pieces)), 0
+    horizon, shine = np.zeros((2, 3)), np.zeros((len(scene.materials), 3))
+    reflects, probes = np.zeros(len(geometry.object), np.bool_), np.zeros((len(pieces), 11))
+    if building is not None:
+        factor, exposure = _exposures(lights, run[CELLS])
+        daylight = building.field.daylight
+        horizon = factor * np.array([daylight.sky, daylight.ground])
+        shine = factor * building.shine
+        shine /= np.maximum(shine.max(axis=1, keepdims=True), 1)
+        reflects = reflective_materials(scene, unlit)[geometry.material]
+        of_cells = np.split(reflects, geometry.cell_start[1:-1])
+        chosen = [cell for cell, shapes in enumerate(of_cells) if shapes.any()]
+        surfaces = LitSurfaces(building, pieces, lights, _tint(scene), 1 / factor)
+        probes, probe_bytes = bake_probes(run, transaction, surfaces, chosen)
+        probes[:, :2] *= factor
+    light = Light(
+        np.array([0 if k.texels is None else len(k.texels) for k in lights], np.int32),
+        factor * np.array([light.white for light in lights]),
+        exposure,
+        np.concatenate([light.lit for light in lights]),
+        np.concatenate([light.mapped for light in lights]),
+        np.concatenate([light.uv for light in lights]),
+        np.concatenate([light.vertex for light in lights]),
+        horizon,
+        shine,
+        reflects,
+        probes,
+        building is not None,
+    )
+    return light, probe_bytes
+
+
 class LightStage(Stage["Light"]):
     """Bakes the light of all cells."""
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 5
-    changed = "light is in colour, of several bounces, and models without lamps have it, too"
+    recipe = 6
+    changed = "glossy surfaces and panes have reflections"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
@@ -312,10 +362,7 @@ class LightStage(Stage["Light"]):
         if options.light == "none":
             return complete(work, _NO_LIGHT, ())
         self.check_model(run, options)
-        import numpy as np
-
         from ptmtools.light.cells import affordable_density, round_bytes
-        from ptmtools.light.model import Light
         from ptmtools.output.geometry import Geometry
         from ptmtools.output.pieces import pieces_of
 
@@ -325,7 +372,8 @@ class LightStage(Stage["Light"]):
         unlit = unlit_materials(scene, lights, painted=model_light is not None)
         asked = options.light_density
         replaced = scene_origin(run).objects
-        pieces = pieces_of(Geometry(scene, cells), cells, unlit, 1 / asked, replaced)
+        geometry = Geometry(scene, cells)
+        pieces = pieces_of(geometry, cells, unlit, 1 / asked, replaced)
         if options.light == "auto" and not model_light:
             density = affordable_density(pieces, asked, round_bytes(image_bytes(run)))
             if not density:
@@ -341,29 +389,12 @@ class LightStage(Stage["Light"]):
         tasks = list(enumerate(pieces))
         baked, _ = bake_textures(run, transaction, bake_cell, shared, tasks, "light")
         cell_lights = [light for light, _ in baked]
-        factor, exposure = (1.0, np.ones(len(pieces)))
-        horizon, shine = np.zeros((2, 3)), np.zeros((len(scene.materials), 3))
-        if baking.building is not None:
-            factor, exposure = _exposures(cell_lights, cells)
-            daylight = baking.building.field.daylight
-            horizon = factor * np.array([daylight.sky, daylight.ground])
-            shine = factor * baking.building.shine
-            shine /= np.maximum(shine.max(axis=1, keepdims=True), 1)
-        artifact = Light(
-            np.array([0 if k.texels is None else len(k.texels) for k in cell_lights], np.int32),
-            factor * np.array([light.white for light in cell_lights]),
-            exposure,
-            np.concatenate([light.lit for light in cell_lights]),
-            np.concatenate([light.mapped for light in cell_lights]),
-            np.concatenate([light.uv for light in cell_lights]),
-            np.concatenate([light.vertex for light in cell_lights]),
-            horizon,
-            shine,
-            baking.building is not None,
+        artifact, probe_bytes = _light_of(
+            run, transaction, baking, geometry, pieces, cell_lights, unlit
         )
         run.keep(LIGHT, artifact)
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
-        total = sum(served for _, served in baked)
+        total = sum(served for _, served in baked) + probe_bytes
         counts = {**self.counts(artifact), "bytes": total, **_kind_of_light(shared.baking)}
         if options.light_density < asked:
             counts["reduced_density"] = options.light_density
@@ -373,6 +404,7 @@ class LightStage(Stage["Light"]):
         return {
             "lightmaps": int((light.side > 0).sum()),
             "texels": int((light.side.astype("int64") ** 2).sum()),
+            "probes": int((light.probe[:, 0] > 0).sum()),
         }
 
     def summary(self, n: Counts) -> str:
@@ -384,6 +416,7 @@ class LightStage(Stage["Light"]):
             ("with lamps", n.get("lamps")),
             ("with the sky", n.get("sky")),
             ("with ceilings that glow", n.get("ceilings")),
+            (count(n.get("probes", 0), "probe"), n.get("probes")),
             (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced),
         )
         total = n.get("bytes", n.get("ptm_bytes"))  # the latter of grey lightmaps

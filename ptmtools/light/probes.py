@@ -1,0 +1,283 @@
+"""Light probes: the light around a point of a cell, which its glossy surfaces reflect.
+
+A probe is a panorama, prefiltered for four roughnesses with the lobe of GGX (Karis 2013, Real
+Shading in Unreal Engine 4: the normal is the direction of the view), each an octahedral map
+(Cigolle et al. 2014) in one image of codes as those of lightmaps. One image streams like any
+texture, and a client needs no cube map, whose faces browsers would filter as codes.
+
+Clients project directions to a box (Lagarde and Zanuttini 2012). Its sides are where most of the
+rays end that leave through them, not those of the cell: these may lie behind a wall.
+
+Tried and rejected: patches of the transport instead of lightmaps (they show as a mosaic on polished
+floors); samples of the lobe instead of all texels (grain from lamps).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.jit import kernel
+from ptmtools.light.baked import BakedSurfaces
+from ptmtools.light.building import BuildingLight
+from ptmtools.light.lamps import lamps_near
+from ptmtools.light.model import light_codes
+from ptmtools.light.occlusion import SPREAD
+from ptmtools.scene.colors import luminance
+
+if TYPE_CHECKING:
+    from ptmtools.cells.model import Cells
+
+#: Texels of the image, and upper left corner and side of the map of each roughness, 0 to 1.
+WIDTH, HEIGHT = 192, 128
+MAPS = ((0, 0, 128), (128, 0, 64), (128, 64, 32), (160, 64, 16))
+#: Rays for each texel of the sharpest map.
+_RAYS = 4
+#: White is at most this multiple of the median: brighter texels, lamps, would take all stops.
+_BRIGHTEST = 64.0
+#: Height of a viewer's eyes, metres; candidates for the centre along each axis of the cell.
+_EYES, _GRID = 1.6, 5
+#: The root of the rays from a candidate, metres beyond which surfaces are far enough, and how much
+#: rays count that end at the backs of walls.
+_FEW, _FAR, _OF_BACKS = 8, 10.0, 4.0
+#: The least distance from the centre to a side of the box, metres.
+_NEAREST = 0.1
+
+
+@dataclass(frozen=True)
+class Probe:
+    """The probe of a cell.
+
+    Attributes
+    ----------
+    texels: (HEIGHT, WIDTH, 3) codes.
+    white: of the codes. mean: luminance over all directions.
+    centre, low, high: (3,) metres, the point, and the corners of the box.
+    """
+
+    texels: NDArray[np.uint8]
+    white: float
+    mean: float
+    centre: Floats
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True)
+class ProbeBaking:
+    """The shared input of all probes.
+
+    Attributes
+    ----------
+    building, surfaces: the light.
+    faces: the scene's triangle of each face that rays meet.
+    corner: (F, 3, 3) of these.
+    """
+
+    building: BuildingLight
+    surfaces: BakedSurfaces
+    faces: Ints
+    corner: Floats
+
+    def probe(self, candidates: Floats) -> Probe:
+        """The probe at the best of (n, 3) points."""
+        centre = self._most_open(candidates)
+        way, solid = _directions(MAPS[0][2] - 2, _RAYS)
+        seen, distance = self._look(centre, way)
+        low, high = _box(centre, way, distance)
+        light = seen.reshape(-1, _RAYS, 3).mean(axis=1)
+        light += self._lamps(centre, way.reshape(-1, _RAYS, 3).mean(axis=1), solid)
+        mean = float((luminance(light) * solid).sum() / solid.sum())
+        maps = [light, *_prefilter(light)]
+        middle = float(np.median(light.max(axis=1)))
+        white = max(texels.max() for texels in maps)
+        white = float(f"{min(white, _BRIGHTEST * middle) if middle > 0 else white:.3g}") or 1.0
+        image = np.full((HEIGHT, WIDTH, 3), 255, np.uint8)
+        image[:] = light_codes(light.mean(axis=0), white)
+        for (left, top, side), texels in zip(MAPS, maps, strict=True):
+            codes = light_codes(texels.reshape(side - 2, side - 2, 3), white)
+            image[top : top + side, left : left + side] = _with_border(codes)
+        return Probe(image, white, mean, centre, low, high)
+
+    def _most_open(self, candidates: Floats) -> Floats:
+        """The candidate whose rays are the longest, of which few end at the backs of walls."""
+        way, _ = _directions(_FEW, 1)
+        scores = []
+        for point in candidates:
+            hit = self._cast(point, way)
+            shows = (hit.front | (hit.face < 0)).mean()
+            length = np.log(np.clip(hit.distance, _NEAREST, _FAR)).mean()
+            scores.append(length + _OF_BACKS * math.log(max(shows, 1e-3)))
+        return np.asarray(candidates[int(np.argmax(scores))])
+
+    def _cast(self, point: Floats, way: Floats) -> _Hits:
+        around = self.building.field.around
+        if around.tree is None:
+            nothing = np.full(len(way), -1)
+            zero = np.zeros(len(way))
+            return _Hits(nothing, zero, zero, np.full(len(way), np.inf), nothing > 0, nothing > 0)
+        origin = np.tile((point - around.middle).astype(np.float32), (len(way), 1))
+        hit = around.tree.run(origin, way.astype(np.float32), output=True)
+        face = hit["primID"].astype(np.int64)
+        first = self.building.field.patches.first
+        back = np.einsum("nx,nx->n", hit["Ng"], way) > 0
+        front = (face >= 0) & (first[face, back.astype(np.int64)] >= 0)
+        distance = np.where(face >= 0, hit["tfar"].astype(np.float64), np.inf)
+        return _Hits(face, hit["u"], hit["v"], distance, front, back)
+
+    def _look(self, point: Floats, way: Floats) -> tuple[Floats, Floats]:
+        """(n, 3) what arrives from (n, 3) directions, and (n,) from how far."""
+        hit, daylight = self._cast(point, way), self.building.field.daylight
+        light = np.where(way[:, 1:2] >= 0, daylight.sky, daylight.ground)
+        rows = np.flatnonzero(hit.face >= 0)
+        face = hit.face[rows]
+        u, v = hit.u[rows].astype(np.float64), hit.v[rows].astype(np.float64)
+        a, b, c = np.moveaxis(self.corner[face], 1, 0)
+        at = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+        light[rows] = self.surfaces.radiance(self.faces[face], u, v, at, ~hit.back[rows])
+        return light, hit.distance
+
+    def _lamps(self, point: Floats, way: Floats, solid: Floats) -> Floats:
+        """(n, 3) what lamps without a surface add to the texels in (n, 3) directions, of (n,)
+        steradians."""
+        around, lamps = self.building.field.around, self.building.lamps
+        single = lamps.groups()
+        lamps = lamps.only(single[0] | single[1])
+        result = np.zeros_like(way)
+        if not len(lamps):
+            return result
+        lamps = lamps_near(lamps, point[None, None], self.building.usual)
+        to, power, target = lamps.arrival(point, around.size)
+        free = around.free(np.tile(point, (len(target), 1)), target)
+        for k in np.flatnonzero(free & (power > 0)).tolist():
+            texel = int(np.argmax(np.einsum("nx,x->n", way, to[k])))
+            result[texel] += power[k] * lamps.color[k] / solid[texel]
+        return result
+
+
+@dataclass(frozen=True)
+class _Hits:
+    """What n rays meet: (n,) faces, -1 for none, barycentric coordinates, metres, whether the side
+    is one that shows, and whether it is the back."""
+
+    face: Ints
+    u: NDArray[np.floating[Any]]
+    v: NDArray[np.floating[Any]]
+    distance: Floats
+    front: Bools
+    back: Bools
+
+
+@cache
+def _directions(side: int, rays: int) -> tuple[Floats, Floats]:
+    """(side² · rays, 3) unit directions, ``rays`` in each texel of an octahedral map, rows from the
+    top, and (side²,) steradians of the texels."""
+    row, column = np.divmod(np.arange(side * side), side)
+    number = np.arange(rays * side * side).reshape(-1, rays)
+    # One ray goes through the middle.
+    across, along = ((number * step + 0.5) % 1.0 if rays > 1 else 0.5 for step in SPREAD)
+    place = np.stack([column[:, None] + across, row[:, None] + along], axis=-1).reshape(-1, 2)
+    corner = _octahedron(2 * place / side - 1)
+    middle = _octahedron((2 * np.stack([column, row], axis=1) + 1) / side - 1)
+    solid = (2 / side) ** 2 / np.linalg.norm(middle, axis=1) ** 3
+    return corner / np.linalg.norm(corner, axis=1, keepdims=True), solid
+
+
+def _octahedron(place: Floats) -> Floats:
+    """(n, 3) points of an octahedron at (n, 2) places of its map, in [-1, 1]."""
+    x, z = place.T
+    y = 1 - np.abs(x) - np.abs(z)
+    below = y < 0
+    over, along = (1 - np.abs(z)) * np.where(x < 0, -1, 1), (1 - np.abs(x)) * np.where(z < 0, -1, 1)
+    return np.stack([np.where(below, over, x), y, np.where(below, along, z)], axis=1)
+
+
+def _prefilter(light: Floats) -> list[Floats]:
+    """(m, 3) each of the maps but the first, for (n, 3) light of the first."""
+    side = MAPS[0][2] - 2
+    # No lobe is as narrow as two texels.
+    blocks = light.reshape(side // 2, 2, side // 2, 2, 3)
+    source = np.ascontiguousarray(blocks.mean(axis=(1, 3)).reshape(-1, 3))
+    result = []
+    for number, (_, _, target) in enumerate(MAPS[1:], 1):
+        alpha = (number / (len(MAPS) - 1)) ** 2
+        way, _ = _directions(target - 2, 1)
+        result.append(filter_lobe(way, *_directions(side // 2, 1), source, alpha))
+    return result
+
+
+@kernel
+def filter_lobe(
+    target: NDArray[np.float64],
+    way: NDArray[np.float64],
+    solid: NDArray[np.float64],
+    light: NDArray[np.float64],
+    alpha: float,
+) -> NDArray[np.float64]:
+    """(m, 3) the light from (n, 3) directions of (n,) steradians that a surface of GGX ``alpha``
+    reflects towards each of (m, 3) directions, its normal being that direction."""
+    result = np.zeros((len(target), 3))
+    for t in range(len(target)):
+        total = 0.0
+        for s in range(len(way)):
+            cosine = target[t, 0] * way[s, 0] + target[t, 1] * way[s, 1] + target[t, 2] * way[s, 2]
+            if cosine <= 0:
+                continue
+            across = 0.5 * (1 + cosine) * (alpha * alpha - 1) + 1
+            weight = solid[s] * cosine / (across * across)
+            total += weight
+            for c in range(3):
+                result[t, c] += weight * light[s, c]
+        for c in range(3):
+            result[t, c] /= total
+    return result
+
+
+def _with_border(codes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A map with a border of a texel, which repeats those on the other side of an edge."""
+    side = len(codes)
+    result = np.empty((side + 2, side + 2, 3), np.uint8)
+    result[1:-1, 1:-1] = codes
+    result[0, 1:-1], result[-1, 1:-1] = codes[0, ::-1], codes[-1, ::-1]
+    result[1:-1, 0], result[1:-1, -1] = codes[::-1, 0], codes[::-1, -1]
+    result[[0, 0, -1, -1], [0, -1, 0, -1]] = codes[[-1, -1, 0, 0], [-1, 0, -1, 0]]
+    return result
+
+
+def _box(point: Floats, way: Floats, distance: Floats) -> tuple[Floats, Floats]:
+    """(3,) and (3,) the corners of the box that most rays end on: the median of those that leave
+    through each side of a cube. A side that nothing is on is as far as the farthest surface."""
+    far = distance[np.isfinite(distance)].max(initial=1.0)
+    end = way * np.minimum(distance, far)[:, None]
+    axis = np.abs(way).argmax(axis=1)
+    sides = np.array(
+        [
+            [np.median(end[(axis == k) & (way[:, k] * sign > 0), k]) for k in range(3)]
+            for sign in (-1, 1)
+        ]
+    )
+    low = point + np.minimum(sides[0], -_NEAREST)
+    return low, point + np.maximum(sides[1], _NEAREST)
+
+
+def candidates(cells: Cells, cell: int) -> Floats:
+    """(n, 3) points of a cell at which its probe may be: a grid at the height of the eyes, or the
+    middles of its parts."""
+    parts = [
+        cells.leaf_point[slice(*cells.leaf_point_start[leaf : leaf + 2].tolist())]
+        for leaf in np.flatnonzero(cells.leaf_cell == cell)
+    ]
+    points = np.concatenate(parts)
+    low, high = points.min(axis=0), points.max(axis=0)
+    share = (np.arange(_GRID) + 0.5) / _GRID
+    grid = np.stack(np.meshgrid(share, [0.0], share), axis=-1).reshape(-1, 3)
+    grid = low + (high - low) * grid
+    grid[:, 1] = low[1] + min(_EYES, (high[1] - low[1]) / 2)
+    inside = grid[cells.locate(grid) == cell]
+    return inside if len(inside) else np.stack([part.mean(axis=0) for part in parts])
