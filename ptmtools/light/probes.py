@@ -88,7 +88,7 @@ class ProbeBaking:
     def probe(self, candidates: Floats) -> Probe:
         """The probe at the best of (n, 3) points."""
         centre = self._most_open(candidates)
-        way, solid = _directions(MAPS[0][2] - 2, _RAYS)
+        way, solid = directions(MAPS[0][2] - 2, _RAYS)
         seen, distance = self._look(centre, way)
         low, high = _box(centre, way, distance)
         light = seen.reshape(-1, _RAYS, 3).mean(axis=1)
@@ -102,12 +102,12 @@ class ProbeBaking:
         image[:] = light_codes(light.mean(axis=0), white)
         for (left, top, side), texels in zip(MAPS, maps, strict=True):
             codes = light_codes(texels.reshape(side - 2, side - 2, 3), white)
-            image[top : top + side, left : left + side] = _with_border(codes)
+            image[top : top + side, left : left + side] = with_border(codes)
         return Probe(image, white, mean, centre, low, high)
 
     def _most_open(self, candidates: Floats) -> Floats:
         """The candidate whose rays are the longest, of which few end at the backs of walls."""
-        way, _ = _directions(_FEW, 1)
+        way, _ = directions(_FEW, 1)
         scores = []
         for point in candidates:
             hit = self._cast(point, way)
@@ -175,7 +175,7 @@ class _Hits:
 
 
 @cache
-def _directions(side: int, rays: int) -> tuple[Floats, Floats]:
+def directions(side: int, rays: int) -> tuple[Floats, Floats]:
     """(side² · rays, 3) unit directions, ``rays`` in each texel of an octahedral map, rows from the
     top, and (side²,) steradians of the texels."""
     row, column = np.divmod(np.arange(side * side), side)
@@ -207,8 +207,8 @@ def _prefilter(light: Floats) -> list[Floats]:
     result = []
     for number, (_, _, target) in enumerate(MAPS[1:], 1):
         alpha = (number / (len(MAPS) - 1)) ** 2
-        way, _ = _directions(target - 2, 1)
-        result.append(filter_lobe(way, *_directions(side // 2, 1), source, alpha))
+        way, _ = directions(target - 2, 1)
+        result.append(filter_lobe(way, *directions(side // 2, 1), source, alpha))
     return result
 
 
@@ -239,7 +239,7 @@ def filter_lobe(
     return result
 
 
-def _with_border(codes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def with_border(codes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """A map with a border of a texel, which repeats those on the other side of an edge."""
     side = len(codes)
     result = np.empty((side + 2, side + 2, 3), np.uint8)

@@ -102,8 +102,9 @@ class Material:
 
     @property
     def glossy(self) -> bool:
-        """Whether it reflects what has a shape: in what is rougher, no metal, none can be seen."""
-        return self.metallic > 0 or self.roughness < 0.8
+        """Whether it reflects what has a shape; none can be seen in what is rougher. (Metals of
+        unstated roughness, 1, are many: exporters leave out both factors of glTF.)"""
+        return self.roughness < 0.8
 
 
 @dataclass(frozen=True)
