@@ -16,11 +16,11 @@ from ptmtools.pipeline.encoding import (
     preview_file,
     stem_of,
 )
-from ptmtools.pipeline.probes import probe_files
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.light import LIGHT, lightmap_files
+from ptmtools.pipeline.stages.probes import probe_files
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests
 from ptmtools.pipeline.stages.textures import TEXTURES, stored_texture, texture_files

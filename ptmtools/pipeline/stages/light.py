@@ -25,9 +25,9 @@ from ptmtools.pipeline.encoding import (
     lossy_codes,
     ptm_file,
 )
-from ptmtools.pipeline.probes import LitSurfaces, bake_probes, reflective_materials
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.pipeline.stages.probes import LitSurfaces, bake_probes, reflective_materials
 from ptmtools.pipeline.stages.scene import (
     SCENE,
     image_bytes,
