@@ -207,7 +207,5 @@ def test_images_are_read_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize(
     ("metallic", "roughness", "glossy"), [(1, 1, False), (0, 0.79, True), (0, 0.8, False)]
 )
-def test_smooth_materials_are_glossy(
-    metallic: float, roughness: float, glossy: bool
-) -> None:
+def test_smooth_materials_are_glossy(metallic: float, roughness: float, glossy: bool) -> None:
     assert Material("brass", metallic=metallic, roughness=roughness).glossy == glossy

@@ -222,8 +222,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 13
-    changed = "lights have colours, and materials are metallic and rough"
+    recipe = 14
+    changed = "lamps of IFC files have their power"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

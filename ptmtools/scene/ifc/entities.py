@@ -97,9 +97,12 @@ _KINDS: tuple[tuple[Kind, str], ...] = (
         IfcSurfaceFeature""",
     ),
 )
-#: Their surfaces glow, housings included: files seldom tell these apart. The luminance has no
-#: effect, if it is that of all lamps (`ptmtools.light.lamps`).
-_LAMPS, GLOW = ("IfcLightFixture", "IfcLamp"), 1.0
+#: Their surfaces glow, housings included: files seldom tell these apart.
+_LAMPS = "IfcLightFixture", "IfcLamp"
+#: Lumens of a watt, of LEDs, and watts of a lamp whose file states neither.
+_LUMENS_OF_WATT, _WATTS = 100.0, 30.0
+#: Properties with the lumens and with the watts of a lamp.
+_LUMENS, _POWERS = ("ContributedLuminousFlux",), ("TotalWattage", "NominalPower", "Power")
 _PART, _STOREY = "IfcBuildingElementPart", "IfcBuildingStorey"
 
 
@@ -125,6 +128,26 @@ def shines(product: Any) -> bool:
             if relation.is_a("IfcRelDefinesByType"):
                 return any(relation.RelatingType.is_a(f"{name}Type") for name in _LAMPS)
     return False
+
+
+def luminous_flux(file: Any, product: Any) -> float:
+    """Lumens of a lamp, by its properties or those of its type."""
+    from ifcopenshell.util import element, unit
+
+    properties: dict[str, Any] = {}
+    with suppress(*FAULTS):
+        for members in element.get_psets(product).values():
+            properties.update(members)
+    for names, factor in ((_LUMENS, 1.0), (_POWERS, _LUMENS_OF_WATT)):
+        for name in names:
+            value = properties.get(name)
+            if isinstance(value, float | int) and 0 < value < math.inf:
+                watts = 1.0
+                if names is _POWERS:
+                    with suppress(*FAULTS):
+                        watts = float(unit.calculate_unit_scale(file, "POWERUNIT"))
+                return float(value) * factor * watts
+    return _LUMENS_OF_WATT * _WATTS
 
 
 def length_unit(file: Any) -> tuple[str, float | None]:

@@ -17,6 +17,7 @@ model or its unpacked content, and replies with the message of `messages.pack_so
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -27,17 +28,17 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Floats, Ints, areas
 from ptmtools.errors import InputError
 from ptmtools.scene.ifc.entities import (
     FAULTS,
-    GLOW,
     UNSTYLED,
     has_body,
     is_drawn,
     items,
     kind_of,
     length_unit,
+    luminous_flux,
     make_rooms,
     material_of,
     note_dropped,
@@ -56,6 +57,8 @@ from ptmtools.scene.source import MeshArrays, ModelSource, SourceMaterial
 
 _PLAIN, _DIRECT = "opencascade", "passthrough"
 _THREADS = 1
+#: Square metres that a lamp has at least.
+_SMALLEST_LAMP = 1e-4
 _TRIANGLE = 3
 #: Excluding subclasses, which have holes.
 _FACE, _BREP = "IfcIndexedPolygonalFace", "IfcFacetedBrep"
@@ -239,11 +242,15 @@ def _shape(file: Any, element: Any) -> ProductShape:
     number = np.frombuffer(geometry.material_ids_buffer, dtype=np.int32)  # -1 for none
     product = file.by_id(element.id)
     materials = UNSTYLED, *(material_of(file, style) for style in geometry.materials)
+    points = local @ placed[:3, :3].T + placed[:3, 3]
     if shines(product):
-        materials = tuple(replace(material, glow=(GLOW,) * 3) for material in materials)
+        # A diffuse surface of luminance L sends π L lumens a square metre.
+        area = max(float(areas(points[triangles]).sum()), _SMALLEST_LAMP)
+        glow = (luminous_flux(file, product) / (math.pi * area),) * 3
+        materials = tuple(replace(material, glow=glow) for material in materials)
     return ProductShape(
         product,
-        local @ placed[:3, :3].T + placed[:3, 3],
+        points,
         triangles.astype(np.int64),
         materials,
         number.astype(np.int64) + 1,

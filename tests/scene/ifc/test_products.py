@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ptmtools.scene import Scene, ingest
-from ptmtools.scene.ifc import products as ifc_products
 from ptmtools.scene.model import Kind, Storey
 from tests.scene.ifc.ifc_house import DEEP, STOREY, THICK, WIDE, Ifc, house
 from tests.scene.ifc.reading import SCHEMAS, notes, read
@@ -116,9 +116,20 @@ def test_kinds_by_class(tmp_path: Path, schema: str, classes: list[tuple[str, Ki
     assert list(zip(classed, source.kinds, strict=True)) == classes
 
 
-@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
-def test_light_fixtures_glow(tmp_path: Path, schema: str) -> None:
-    from ifcopenshell.api import type as types
+@pytest.mark.parametrize(
+    ("schema", "properties", "lumens"),
+    [
+        ("IFC2X3", {}, 3000),
+        ("IFC4", {}, 3000),
+        ("IFC4", {"TotalWattage": 18.0}, 1800),
+        ("IFC4", {"TotalWattage": 18.0, "ContributedLuminousFlux": 2200.0}, 2200),
+        ("IFC4", {"TotalWattage": -1.0}, 3000),
+    ],
+)
+def test_light_fixtures_glow(
+    tmp_path: Path, schema: str, properties: dict[str, float], lumens: float
+) -> None:
+    from ifcopenshell.api import pset, type as types
 
     made = Ifc(schema)
     made.box("IfcWall", "wall", (0, 0, 0), (1, 1, 1))
@@ -129,6 +140,9 @@ def test_light_fixtures_glow(tmp_path: Path, schema: str) -> None:
     if schema == "IFC2X3":
         kind = made.entity("IfcLightFixtureType", "panel type")
         types.assign_type(made.file, related_objects=[panel], relating_type=kind)
+    if properties:
+        group = pset.add_pset(made.file, product=panel, name="Pset_Lamp")
+        pset.edit_pset(made.file, pset=group, properties=properties)
     source, _ = read(made.write(tmp_path / "lamps.ifc"))
     glow = {
         name.split()[-1]: source.materials[
@@ -136,7 +150,8 @@ def test_light_fixtures_glow(tmp_path: Path, schema: str) -> None:
         ].glow
         for number, name in enumerate(source.objects)
     }
-    assert glow == {"wall": (0,) * 3, "tap": (0,) * 3, "panel": (ifc_products.GLOW,) * 3}
+    assert glow["wall"] == glow["tap"] == (0,) * 3
+    assert glow["panel"] == pytest.approx([lumens / (6 * math.pi)] * 3)
 
 
 @pytest.mark.parametrize(
