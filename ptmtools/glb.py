@@ -105,8 +105,10 @@ def natural(value: object) -> int:
     return value
 
 
-FLOAT, SHORT, INT = 5126, 5123, 5125
+FLOAT, BYTE, SHORT, INT = 5126, 5120, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
+#: The extension that normals of bytes need; it is required of readers.
+QUANTIZATION = "KHR_mesh_quantization"
 #: Narrow indices end before 65535, which restarts a primitive.
 NARROW = 65535
 
@@ -133,6 +135,11 @@ class BufferWriter:
     def shares(self, values: NDArray[np.uint16]) -> int:
         """(n, 4) of 16 bits, normalised: colours."""
         return self._attribute(values.astype("<u2"), {"normalized": True})
+
+    def directions(self, values: NDArray[np.int8]) -> int:
+        """(n, 3) of bytes, normalised, each followed by a byte that is 0: normals."""
+        accessor = {"componentType": BYTE, "count": len(values), "type": "VEC3", "normalized": True}
+        return self._append(accessor, np.pad(values, ((0, 0), (0, 1))).tobytes(), _VERTICES)
 
     def indices(self, triangle: NDArray[np.integer[Any]], vertices: int) -> int:
         """(m, 3) indices, below the number of ``vertices``."""

@@ -107,10 +107,12 @@ class Content:
 
     @cached_property
     def lit_geometry(self) -> Geometry:
-        """`geometry` with the light, and the coordinates in normal maps of objects."""
+        """`geometry` with the light, the coordinates in normal maps of objects, and the normals of
+        what reflects."""
         light, maps = self.extras.light, object_maps(self.extras.represented)
         lit = self.geometry.with_light(light) if light else self.geometry
-        return lit.with_object_maps(maps, self.scene, self.cells) if maps else lit
+        lit = lit.with_object_maps(maps, self.scene, self.cells) if maps else lit
+        return lit.with_normals(self.scene, self.cells) if light else lit
 
     @cached_property
     def shown_materials(self) -> tuple[Material, ...]:

@@ -4,6 +4,9 @@ A cell has one shape for each object, material and sidedness. Positions and text
 rounded to float32 once for the whole scene and welded by equality, so that a vertex shared by two
 pieces is one vertex in the file, and a corner shared by two cells has the same text in both. Pieces
 of which two corners become one in that rounding have no area left; they are dropped and counted.
+
+What is curved and reflects has normals, since facets show in reflections. They are computed: many
+models state none, or those of facets.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import areas, sum_by_group
+from ptmtools.arrays import Floats, areas, normals, sum_by_group
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import single
@@ -29,6 +32,11 @@ if TYPE_CHECKING:
 
 #: The step of coordinates in normal maps, far below a texel.
 _RELIEF_STEP = 2.0**-20
+#: Steps of normals to 1. Faces whose normals differ by less than this cosine, 40°, are taken for
+#: parts of one curved surface: a column of ten sides is one, the edges of a bar of eight are edges.
+NORMAL_STEPS, _CREASE = 127, 0.766
+#: Normals at a corner that agree to a part of this many are one, so that tips of fans cost little.
+_DIRECTIONS = 16
 
 
 @dataclass(frozen=True)
@@ -50,6 +58,8 @@ class Shape:
         likewise, if that has its own; else None.
     lit: whether it has light, in the lightmap or, as a factor of its colours, at its corners.
     reflects: whether it shows the probe of the cell.
+    normals: (m, 3, 3) int8 unit vectors of the corners, in `NORMAL_STEPS`; None of what is flat or
+        does not reflect.
     """
 
     object: int
@@ -65,6 +75,7 @@ class Shape:
     normal: NDArray[np.float32] | None = None
     lit: bool = False
     reflects: bool = False
+    normals: NDArray[np.int8] | None = None
 
 
 class Geometry:
@@ -89,9 +100,12 @@ class Geometry:
     light: the light of the cells, or None.
     relief: (M, 3, 9) as in `Shape`, 0 of objects without a normal map; relieved: (S,) whether a
         shape has one.
+    normals, curved: (M, 3, 3) as in `Shape`, 0 of flat shapes; (S,) whether a shape has normals.
     """
 
     light: Light | None = None
+    normals: NDArray[np.int8] | None = None
+    curved: NDArray[np.bool_]
     relief: NDArray[np.float32] | None = None
     relieved: NDArray[np.bool_]
 
@@ -169,6 +183,31 @@ class Geometry:
         result.relief[relieved, :, 2:] = maps.frame[source][:, None]
         return result
 
+    def with_normals(self, scene: Scene, cells: Cells) -> Geometry:
+        """The same geometry, lit, with the normals of what is curved and reflects, without those
+        that have normal maps of their objects."""
+        light = self.light
+        assert light is not None
+        reflects = light.reflects.copy()
+        if self.relief is not None:
+            reflects &= ~self.relieved
+        faces = np.flatnonzero(np.isin(scene.triangle_object, self.object[reflects]))
+        if not len(faces):
+            return self
+        corners = single(scene.points[scene.triangles[faces]], "vertices")
+        value = np.zeros((len(scene.triangles), 3, 3))
+        value[faces] = smooth_normals(corners, scene.triangle_object[faces])
+        curved = np.zeros(len(value), np.bool_)
+        curved[faces] = bends(corners.astype(np.float64), value[faces])
+        count = np.diff(self.triangle_start)
+        bent = curved[cells.triangle_source[self.piece]] & np.repeat(reflects, count)
+        result = copy(self)
+        result.curved = np.add.reduceat(bent, self.triangle_start[:-1]) > 0
+        rows = np.repeat(result.curved, count)
+        result.normals = np.zeros((len(rows), 3, 3), np.int8)
+        result.normals[rows] = normal_steps(_carry_over(scene, cells, self.piece[rows], value))
+        return result
+
     def areas(self) -> NDArray[np.float64]:
         """(S,) m² of each shape."""
         count = np.diff(self.triangle_start)
@@ -196,6 +235,7 @@ class Geometry:
             self.normal[rows] if self.normal is not None and self._own_normal[s] else None,
             self.light is not None and bool(self.light.lit[s]),
             self.light is not None and bool(self.light.reflects[s]),
+            self.normals[rows] if self.normals is not None and self.curved[s] else None,
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:
@@ -233,6 +273,58 @@ def _carry_over(
     corners, value = scene.corners[source], values[source].astype(np.float64)
     away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
     return np.asarray(value[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, value), away))
+
+
+def smooth_normals(corner: NDArray[np.floating], group: NDArray[np.integer]) -> Floats:
+    """(T, 3, 3) unit normals of the corners of triangles (T, 3, 3): the means, weighted by area and
+    angle, over the triangles of the same (T,) group that have a corner in the same place, and a
+    normal within the crease angle; 0 of what has no area."""
+    _, place = _weld(corner.reshape(-1, 3).astype(np.float32))
+    points = corner.astype(np.float64)
+    face = _unit(normals(points))
+    ahead = _unit(np.roll(points, -1, axis=1) - points)
+    cosine = -np.einsum("tcx,tcx->tc", ahead, np.roll(ahead, 1, axis=1))
+    weight = (np.arccos(np.clip(cosine, -1, 1)) * areas(points)[:, None]).ravel()
+    # Equal directions at one corner of a group become one; they follow each other in their order.
+    side = 2 * _DIRECTIONS + 1
+    cube = np.rint(_DIRECTIONS * face).astype(np.int64) + _DIRECTIONS
+    direction = np.repeat((cube[:, 0] * side + cube[:, 1]) * side + cube[:, 2], 3)
+    at = np.repeat(group.astype(np.int64), 3) * (int(place.max(initial=0)) + 1) + place
+    keys, row = np.unique(at * side**3 + direction, return_inverse=True)
+    row = row.ravel()
+    weighted = weight[:, None] * np.repeat(face, 3, axis=0)
+    part = np.stack([sum_by_group(row, weighted[:, axis], len(keys)) for axis in range(3)], axis=1)
+    mean, total, at = _unit(part), part.copy(), keys // side**3
+    first, step = np.arange(len(keys) - 1), 1
+    while len(first := first[at[first] == at[first + step]]):
+        near = np.einsum("nx,nx->n", mean[first], mean[first + step]) > _CREASE
+        a, b = first[near], first[near] + step
+        total[a] += part[b]
+        total[b] += part[a]
+        step += 1
+        first = first[first < len(keys) - step]
+    return _unit(total)[row].reshape(-1, 3, 3)
+
+
+def bends(corner: Floats, normal: Floats) -> NDArray[np.bool_]:
+    """(T,) whether the (T, 3, 3) normals of the corners of triangles are others than their own."""
+    apart = np.abs(normal - _unit(normals(corner))[:, None]).max(axis=(1, 2))
+    return np.asarray(NORMAL_STEPS * apart > 0.5)
+
+
+def normal_steps(normal: Floats) -> NDArray[np.int8]:
+    """Vectors (..., 3) as unit vectors in `NORMAL_STEPS`; those of no length point up."""
+    unit = _unit(normal)
+    unit[~unit.any(axis=-1)] = [0.0, 1.0, 0.0]
+    return np.asarray(np.rint(NORMAL_STEPS * unit), np.int8)
+
+
+def _unit(vector: Floats) -> Floats:
+    """(..., 3) of length 1, or 0 where that is 0."""
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    unit = np.zeros_like(vector)
+    np.divide(vector, length, out=unit, where=length > 0)
+    return unit
 
 
 def _index_rows(

@@ -1,10 +1,11 @@
 """The buffer of a cell compressed with meshopt (EXT_meshopt_compression).
 
 All shapes of a cell share one array of vertices and one of indices; those with colours have two of
-their own, and so have those with a lightmap, and those with a normal map. A vertex is a position,
-texture coordinates and coordinates in the lightmap or the normal map, or both, float32 on the grids
-of `ptmtools.output.grid`, stored as 24 bits and an exponent (filter EXPONENTIAL). Normals and
-tangents are a view of their own: they are those of charts, and take next to no bytes. Shapes lie in
+their own, and so have those with a lightmap, those with a normal map, and those with normals. A
+vertex is a position, texture coordinates and coordinates in the lightmap or the normal map, or
+both, float32 on the grids of `ptmtools.output.grid`, stored as 24 bits and an exponent (filter
+EXPONENTIAL). Normals and tangents of normal maps are a view of their own: they are those of charts,
+and take next to no bytes. Normals of curved surfaces are bytes, in another view. Shapes lie in
 the order of their materials, the vertices and triangles of each in that of
 `ptmtools.meshopt.encoding.reorder`. Buffer 1 is the fallback of the extension: it has no data,
 and the extension is required.
@@ -30,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.glb import FLOAT, INT, NARROW, SHORT
+from ptmtools.glb import BYTE, FLOAT, INT, NARROW, QUANTIZATION, SHORT
 from ptmtools.meshopt.encoding import (
     encode_attributes,
     encode_triangles,
@@ -41,7 +42,6 @@ from ptmtools.output.gltf_shapes import Sizes, Vertices, shortest
 from ptmtools.output.grid import texture_exponents
 
 MESHOPT = "EXT_meshopt_compression"
-EXTENSIONS = {"extensionsUsed": [MESHOPT], "extensionsRequired": [MESHOPT]}
 #: Bytes of a position, of texture coordinates, of a colour.
 _POSITION, _COORDINATES, _COLOR = 12, 8, 8
 #: Columns of positions, of these and texture coordinates, of these and light, and of all these and
@@ -50,6 +50,7 @@ _PLACED, _TEXTURED, _LIT, _BOTH = 3, 5, 7, 9
 #: Exponents of the steps of normal, tangent and sign, see `apo.normal_map`; bytes of a normal.
 _FRAME, _NORMAL = np.array([-9] * 6 + [0]), 12
 _WHOLE_BYTES = 0
+_NORMALIZED = {"normalized": True}
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class _BufferPart:
     textured, lit, both: whether it has texture coordinates, those in a lightmap or normal map, and
         those in a normal map besides.
     frame: (n, 7) in steps, or None.
-    color: (n, 4) or None.
+    color: (n, 4) or None. normals: (n, 3) int8 or None.
     triangle: (m, 3)
     """
 
@@ -79,12 +80,14 @@ class _BufferPart:
     both: bool
     frame: NDArray[np.int64] | None
     color: NDArray[np.uint16] | None
+    normals: NDArray[np.int8] | None
     triangle: NDArray[np.int64]
 
     @property
-    def kind(self) -> tuple[bool, bool, bool, bool]:
+    def kind(self) -> tuple[bool, ...]:
         """Parts of one kind share their arrays."""
-        return self.lit, self.both, self.frame is not None, self.color is not None
+        optional = self.frame, self.color, self.normals
+        return (self.lit, self.both, *(rows is not None for rows in optional))
 
 
 class CompressedBuffer:
@@ -111,7 +114,8 @@ class CompressedBuffer:
                 pair = slice(first, first + 2)
                 exponent[pair] = texture_exponents(coordinates, *(size or (1, 1)))
                 step[:, pair] = _steps(coordinates, exponent[pair])
-        columns = step if vertices.color is None else np.hstack([step, vertices.color])
+        more = [rows for rows in (vertices.color, vertices.normals) if rows is not None]
+        columns = np.hstack([step, *more]) if more else step
         _, first, place = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         corner = step[vertices.triangle, :3]
         flat = (corner == np.roll(corner, 1, axis=1)).all(axis=2).any(axis=1)
@@ -134,6 +138,7 @@ class CompressedBuffer:
                 both,
                 frame,
                 color,
+                None if vertices.normals is None else vertices.normals[rows],
                 triangle,
             )
         )
@@ -143,11 +148,11 @@ class CompressedBuffer:
         """Encodes the arrays and completes the primitives."""
         for kind in sorted({part.kind for part in self._parts}):
             parts = [part for part in self._parts if part.kind == kind]
-            self._encode(sorted(parts, key=lambda p: p.material), *kind)
+            self._encode(sorted(parts, key=lambda p: p.material))
 
-    def _encode(
-        self, parts: list[_BufferPart], lit: bool, normal: bool, framed: bool, painted: bool
-    ) -> None:
+    def _encode(self, parts: list[_BufferPart]) -> None:
+        """Shapes of one kind."""
+        lit, normal, framed, painted, curved = parts[0].kind
         step = np.concatenate([part.step for part in parts])
         exponent = np.repeat([p.exponent for p in parts], [len(p.step) for p in parts], axis=0)
         textured = any(part.textured for part in parts)
@@ -175,6 +180,12 @@ class CompressedBuffer:
                 "NORMAL": self._accessor(view, 0, FLOAT, count, "VEC3"),
                 "TANGENT": self._accessor(view, _NORMAL, FLOAT, count, "VEC4"),
             }
+        if curved:
+            normals = np.concatenate([p.normals for p in parts if p.normals is not None])
+            element = np.pad(normals, ((0, 0), (0, 1))).view(np.uint8)
+            stream = encode_attributes(element, _WHOLE_BYTES)
+            view = self._view(stream, element, {"mode": "ATTRIBUTES"})
+            attributes["NORMAL"] = self._accessor(view, 0, BYTE, count, "VEC3", _NORMALIZED)
         both = attributes
         if textured:
             place = self._accessor(vertices, _POSITION, FLOAT, count, "VEC2")
@@ -184,8 +195,7 @@ class CompressedBuffer:
             element = np.ascontiguousarray(colors).view(np.uint8).reshape(count, _COLOR)
             stream = encode_attributes(element, _WHOLE_BYTES)
             view = self._view(stream, element, {"mode": "ATTRIBUTES"})
-            more = {"normalized": True}
-            color = {"COLOR_0": self._accessor(view, 0, SHORT, count, "VEC4", more)}
+            color = {"COLOR_0": self._accessor(view, 0, SHORT, count, "VEC4", _NORMALIZED)}
             attributes, both = attributes | color, both | color
         self._triangles(parts, count, (attributes, both))
 
@@ -246,7 +256,11 @@ class CompressedBuffer:
         if not self._parts:
             return {}
         fallback = {"byteLength": self._decoded, "extensions": {MESHOPT: {"fallback": True}}}
-        return EXTENSIONS | {
+        quantized = [QUANTIZATION] if any(p.normals is not None for p in self._parts) else []
+        used = [MESHOPT, *quantized]
+        return {
+            "extensionsUsed": used,
+            "extensionsRequired": used,
             "accessors": self._accessors,
             "bufferViews": self._views,
             "buffers": [{"byteLength": self._size}, fallback],

@@ -15,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.glb import COMPONENTS, ITEMS, elements, meaning
+from ptmtools.glb import BYTE, COMPONENTS, ITEMS, QUANTIZATION, elements, meaning
 from ptmtools.meshopt.decoding import decode
 from ptmtools.output.gltf import WHITE, WRAPS, unpack
-from ptmtools.output.gltf_compressed import EXTENSIONS, MESHOPT
+from ptmtools.output.gltf_compressed import MESHOPT
+from ptmtools.output.gltf_shapes import stride_of
 from ptmtools.output.model import FileError
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
 _WRAPS = ("wrapS", "wrapT")
+#: Largest difference of the length of a normal of bytes from 1.
+_LENGTH = 0.01
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class ReadMaterial:
         scale, normal_wrap: of that of the material, the number of its coordinates, the factor of
         its normals and the numbers of its sampler; coords is None of that of the object.
     metallic, roughness: in [0, 1].
+    probe: index in the hints of what it reflects, or None.
     """
 
     factor: tuple[float, ...]
@@ -67,6 +71,7 @@ class ReadMaterial:
     normal_wrap: tuple[int, int] = (WRAPS["repeat"], WRAPS["repeat"])
     metallic: float = 0.0
     roughness: float = 1.0
+    probe: int | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,7 @@ class ReadPrimitive:
         the upper left, or None.
     normal: (n, 2) likewise in the normal map of the material, or None.
     frame: (n, 7) float32 normal, tangent and sign of the bitangent, or None.
+    normals: (n, 3) float32 unit normals of a curved surface that reflects, or None.
     """
 
     place: str
@@ -99,6 +105,7 @@ class ReadPrimitive:
     light: NDArray[np.float32] | None = None
     frame: NDArray[np.float32] | None = None
     normal: NDArray[np.float32] | None = None
+    normals: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,10 @@ class _GlbReader:
             {name for row in document.get("textures", ()) for name in row.get("extensions", ())}
         )
         required = document.get("extensionsRequired", [])
-        self._compressed = required == EXTENSIONS["extensionsRequired"]
+        self._compressed = MESHOPT in required
+        quantized = any(row["componentType"] == BYTE for row in document.get("accessors", ()))
+        if required != [MESHOPT] * self._compressed + [QUANTIZATION] * quantized:
+            _foreign("document", "requires other extensions than it uses")
         if document.get("extensionsUsed", []) != required + images:
             _foreign("document", "lists other extensions than it uses")
         fallbacks = [MESHOPT in buffer.get("extensions", {}) for buffer in buffers]
@@ -178,7 +188,8 @@ class _GlbReader:
         uv, light, third = (
             self._rows(attributes, f"TEXCOORD_{n}", "VEC2", len(point), place) for n in range(3)
         )
-        frame = self._frames(attributes, len(point), place)
+        normals = self._normals(attributes, len(point), place)
+        frame = self._frames(attributes, len(point), place) if normals is None else None
         color = self._colors(attributes, len(point), place)
         index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
         if len(index) % 3 or int(index.max()) >= len(point):
@@ -193,6 +204,7 @@ class _GlbReader:
             light = None if light is None else light[used]
             third = None if third is None else third[used]
             frame = None if frame is None else frame[used]
+            normals = None if normals is None else normals[used]
             color = None if color is None else color[used]
         material = self._material(primitive["material"])
         if light is not None and material.texture is None:
@@ -222,6 +234,7 @@ class _GlbReader:
             light,
             frame,
             normal,
+            normals,
         )
 
     def _rows(
@@ -233,6 +246,23 @@ class _GlbReader:
         if len(rows) != count:
             _foreign(place, f"{len(rows)} rows of {name} for {count} positions")
         return rows
+
+    def _normals(
+        self, attributes: dict[str, int], count: int, place: str
+    ) -> NDArray[np.float32] | None:
+        """Those of bytes; None without, and for those of floats, which belong to frames."""
+        index = attributes.get("NORMAL")
+        if index is None or self._row("accessors", index)["componentType"] != BYTE:
+            return None
+        rows = self._elements(index, "VEC3", (BYTE,), _VERTICES)
+        normals = meaning(rows, self._tree["accessors"][index].get("normalized", False))
+        if (
+            len(rows) != count
+            or "TANGENT" in attributes
+            or np.abs(np.linalg.norm(normals, axis=1) - 1).max() > _LENGTH
+        ):
+            _foreign(place, f"{len(rows)} normals for {count} positions, or of another length")
+        return normals.astype(np.float32)
 
     def _frames(
         self, attributes: dict[str, int], count: int, place: str
@@ -274,13 +304,13 @@ class _GlbReader:
         if accessor["type"] != form or component not in components:
             _foreign(place, f"{accessor['type']} of component type {component}")
         unit = np.dtype(COMPONENTS[component]).itemsize
-        size = ITEMS[form] * unit
+        stride = stride_of(component, form) if target == _VERTICES else ITEMS[form] * unit
         if self._compressed:
             view, data = self._decode_view(accessor["bufferView"], target)
         else:
             view, data = self._row("bufferViews", accessor["bufferView"]), self._data
             self._row("buffers", view["buffer"])
-            if view.get("target") != target or view.get("byteStride", size) != size:
+            if view.get("target") != target or view.get("byteStride", stride) != stride:
                 _foreign(place, "its buffer view is for other data")
         try:
             rows = elements(accessor, view, data)
@@ -367,6 +397,7 @@ class _GlbReader:
             normal_wrap=normal_wrap,
             metallic=surface["metallicFactor"],
             roughness=surface.get("roughnessFactor", 1),
+            probe=extras.get("probe"),
         )
 
     def _image(self, use: dict[str, int] | None, wrap: tuple[int, int], place: str) -> str | None:
@@ -391,7 +422,7 @@ def _check_extras(material: Mapping[str, Any], extras: Mapping[str, Any], place:
     """Raises FileError PTM-D731 where the extras of a material and its textures differ."""
     of_normal = {name for name in extras if name.startswith("normal")}
     if (
-        extras.keys() - {"mesh", "light", "white"} - of_normal
+        extras.keys() - {"mesh", "light", "white", "probe"} - of_normal
         and not {"ptm", "texture"} <= extras.keys()
     ):
         _foreign(f"{place}.extras", "has members of a texture, but not its .ptm and its place")
@@ -408,6 +439,10 @@ def _check_extras(material: Mapping[str, Any], extras: Mapping[str, Any], place:
             _foreign(place, f"has an image of {name}, but not its place in the hints")
     if "light" in extras and "white" not in extras:
         _foreign(place, "has a lightmap, but not the light of its codes")
+    factor = material["pbrMetallicRoughness"].get("baseColorFactor", WHITE)
+    pane = material.get("alphaMode") == "BLEND" and "texture" not in extras and factor[3] < 1
+    if "probe" in extras and "white" not in extras and not pane:
+        _foreign(place, "reflects, but is neither lit nor a pane")
     if "light" in extras and "normal" in extras and coords is None:
         _foreign(place, "has both a lightmap and a normal map")
 

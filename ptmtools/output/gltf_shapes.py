@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.glb import COMPONENTS, FLOAT, INT, ITEMS, SHORT, BufferWriter
+from ptmtools.glb import BYTE, COMPONENTS, FLOAT, INT, ITEMS, QUANTIZATION, SHORT, BufferWriter
 from ptmtools.meshopt.encoding import by_first_use
 from ptmtools.output.geometry import Shape
 from ptmtools.scene.colors import pack_colors, to_linear, unpack_colors
@@ -34,7 +34,7 @@ class VertexTables(Protocol):
 
 @dataclass(frozen=True)
 class Vertices:
-    """A shape as glTF has it; vertices differ in position, coordinates or colour.
+    """A shape as glTF has it; vertices differ in position, coordinates, colour or normal.
 
     Attributes
     ----------
@@ -46,6 +46,7 @@ class Vertices:
         left; None without one.
     normal: (n, 2) those in the normal map of a shape with a lightmap, if they are its own.
     frame: (n, 7) float32 normal, tangent and sign of the bitangent; None without a normal map.
+    normals: (n, 3) int8 as in `Shape`, or None.
     """
 
     point: NDArray[np.float32]
@@ -55,6 +56,7 @@ class Vertices:
     light: NDArray[np.float32] | None = None
     frame: NDArray[np.float32] | None = None
     normal: NDArray[np.float32] | None = None
+    normals: NDArray[np.int8] | None = None
 
 
 def vertices_of(tables: VertexTables, shape: Shape, *, textured: bool) -> Vertices:
@@ -80,13 +82,21 @@ def vertices_of(tables: VertexTables, shape: Shape, *, textured: bool) -> Vertic
         # 8 bits of linear light would be too few in the dark.
         rgba = np.full((len(color), 4), 65535, np.uint16)
         rgba[:, :3] = np.rint(65535 * to_linear(color / 255))
+    normals = None
+    if shape.normals is not None:
+        packed = pack_colors(shape.normals.view(np.uint8))
+        both, triangle = by_first_use(triangle << 24 | packed)
+        source, normals = both >> 24, unpack_colors(both & 0xFFFFFF).view(np.int8)
+        vertex = vertex[source]
+        second = None if second is None else second[source]
+        rgba = None if rgba is None else rgba[source]
     point = tables.point[shape.point[vertex // width]]
     uv = flip_v(tables.uv[shape.uv[vertex % width]]) if textured else None
     light = None if second is None else flip_v(second[:, :2])
     frame = None if second is None or shape.relief is None else second[:, 2:]
     third = len(present) > 1 and second is not None
     normal = flip_v(second[:, 2:4]) if third and second is not None else None
-    return Vertices(point, uv, rgba, triangle, light, frame, normal)
+    return Vertices(point, uv, rgba, triangle, light, frame, normal, normals)
 
 
 def flip_v(uv: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -111,9 +121,16 @@ _KINDS = (
     (FLOAT, "VEC2"),
     (FLOAT, "VEC4"),
     (SHORT, "VEC4"),
+    (BYTE, "VEC3"),
     (INT, "SCALAR"),
     (SHORT, "SCALAR"),
 )
+
+
+def stride_of(component: int, form: str) -> int:
+    """The bytes of an element of an array of vertices, a multiple of 4."""
+    size = ITEMS[form] * np.dtype(COMPONENTS[component]).itemsize
+    return int(size + -size % 4)
 
 
 class PlainBuffer(BufferWriter):
@@ -145,6 +162,8 @@ class PlainBuffer(BufferWriter):
         if vertices.frame is not None:
             attributes["NORMAL"] = self.vectors(vertices.frame[:, :3])
             attributes["TANGENT"] = self.vectors(vertices.frame[:, 3:])
+        if vertices.normals is not None:
+            attributes["NORMAL"] = self.directions(vertices.normals)
         if vertices.color is not None:
             attributes["COLOR_0"] = self.shares(vertices.color)
         indices = self.indices(vertices.triangle, len(vertices.point))
@@ -168,8 +187,8 @@ class PlainBuffer(BufferWriter):
         return shortest(values)
 
     def members(self) -> dict[str, Any]:
-        """The members "accessors", "bufferViews" and "buffers" of the document; none without
-        arrays."""
+        """The members "accessors", "bufferViews" and "buffers" of the document, and the extensions
+        that these use; none without arrays."""
         views: list[dict[str, Any]] = []
         place: dict[int, int] = {}
         at = 0
@@ -180,19 +199,18 @@ class PlainBuffer(BufferWriter):
             view: dict[str, Any] = {"buffer": 0} | ({"byteOffset": at} if at else {})
             view["byteLength"] = self._sizes[kind]
             # Vertex data that several accessors share must have it, indices must not.
-            if form != "SCALAR" and len(self._of_kind[kind]) > 1:
-                view["byteStride"] = ITEMS[form] * np.dtype(COMPONENTS[component]).itemsize
+            if form != "SCALAR" and (len(self._of_kind[kind]) > 1 or component == BYTE):
+                view["byteStride"] = stride_of(component, form)
             views.append(view | {"target": self._targets[kind]})
             at += self._sizes[kind]
-        return (
-            {}
-            if not views
-            else {
-                "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
-                "bufferViews": views,
-                "buffers": [{"byteLength": at}],
-            }
-        )
+        if not views:
+            return {}
+        used = [QUANTIZATION] if self._sizes[_KINDS.index((BYTE, "VEC3"))] else []
+        return ({"extensionsUsed": used, "extensionsRequired": used} if used else {}) | {
+            "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
+            "bufferViews": views,
+            "buffers": [{"byteLength": at}],
+        }
 
     def bytes(self) -> bytes:
         """All arrays."""

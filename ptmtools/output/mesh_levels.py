@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Ints
-from ptmtools.output.geometry import Geometry, Shape
+from ptmtools.output.geometry import Geometry, Shape, normal_steps, smooth_normals
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -163,6 +163,10 @@ def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> DetailLevel:
     table, corner = np.unique(uv.reshape(-1, 2).astype(np.float32), axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)
     assert mesh.material is not None
+    normals = None
+    if any(shape.normals is not None for shape in shapes):
+        group = np.zeros(len(corner), np.int64)
+        normals = normal_steps(smooth_normals(mesh.points[mesh.triangles], group))
     parts = []
     for place, shape in enumerate(shapes):
         selected = np.flatnonzero(mesh.material == place)
@@ -183,6 +187,7 @@ def _level(mesh: Mesh, shapes: Sequence[Shape], error: float) -> DetailLevel:
                 color,
                 lit=shape.lit,
                 reflects=shape.reflects,
+                normals=None if shape.normals is None or normals is None else normals[selected],
             )
         )
     return DetailLevel(mesh.points.astype(np.float32), table, tuple(parts), error)

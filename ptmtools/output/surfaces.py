@@ -79,6 +79,7 @@ class Surfaces:
     white: (n,) the light of which the codes of lightmaps, and of those without one the colours of
         corners, are shares; 0 of what is not lit. None if nothing is.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
+    normals: (n, 3, 3) float32 unit normals of the corners, 0 of flat triangles; None if all are.
     opacity: (n,) of the factor, 0 to 1.
     transparent: (n,) whether it, and the alpha of the texture, count. cutoff: (n,) of those
         whose texels of less alpha are not drawn, and all others opaque; 0 of those that blend.
@@ -101,6 +102,7 @@ class Surfaces:
     white: Floats | None = None
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
+    normals: NDArray[np.float32] | None = None
     vertex_colors: Floats | None = None
     opacity: Floats | None = None
     transparent: Bools | None = None
@@ -236,12 +238,26 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         else None,
         relief=_relief([p for _, p in shapes]),
         bumps=bumps_of([p for _, p in shapes], count),
+        normals=_normals([p for _, p in shapes]),
         vertex_colors=None if all(p.color is None for _, p in shapes) else vertex_colors,
         opacity=spread([m.factor[3] for m in materials], np.float64),
         transparent=spread([m.blends for m in materials], np.bool_),
         cutoff=spread(
             [0 if m.cutoff is None else max(m.cutoff, LEAST_ALPHA) for m in materials], np.float64
         ),
+    )
+
+
+def _normals(shapes: list[ReadPrimitive]) -> NDArray[np.float32] | None:
+    if all(p.normals is None for p in shapes):
+        return None
+    return np.concatenate(
+        [
+            np.zeros((len(p.triangle), 3, 3), np.float32)
+            if p.normals is None
+            else p.normals[p.triangle]
+            for p in shapes
+        ]
     )
 
 

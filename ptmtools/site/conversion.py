@@ -21,6 +21,7 @@ from ptmtools.errors import InputError, naming
 from ptmtools.files import open_regular
 from ptmtools.glb import COMPONENTS
 from ptmtools.output.gltf import pack, unpack
+from ptmtools.output.gltf_compressed import MESHOPT
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.store.folder import damage_error, reading_error
 
@@ -29,8 +30,10 @@ PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
 #: The members of a material, of its surface and of its extras that the page reads.
 _LOOK = ("alphaMode", "alphaCutoff", "doubleSided")
 _SURFACE = ("baseColorFactor",)
+#: Of what reflects.
+_GLOSS = ("metallicFactor", "roughnessFactor")
 _NORMAL = ("normal", "normalCoords", "normalScale", "normalWrapS", "normalWrapT")
-_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", "white", *_NORMAL)
+_EXTRAS = ("texture", "wrapS", "wrapT", "mesh", "octree", "light", "white", "probe", *_NORMAL)
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,8 @@ def lean_glb(data: bytes) -> bytes:
             primitives.append(primitive | {"material": looks.index(look)})
     accessors: list[dict[str, Any]] = document.get("accessors", [])
     # Equal arrays of plain cells share an accessor.
-    merged = _merge(primitives, accessors) if "extensionsRequired" in document else primitives
+    required = document.get("extensionsRequired", [])
+    merged = _merge(primitives, accessors) if MESHOPT in required else primitives
     used = sorted({a for p in merged for a in (*p["attributes"].values(), p["indices"])})
     place = {accessor: n for n, accessor in enumerate(used)}
     for primitive in merged:
@@ -155,7 +159,6 @@ def lean_glb(data: bytes) -> bytes:
         primitive["indices"] = place[primitive["indices"]]
     # Those of images go with the images.
     names = ("extensionsUsed", "extensionsRequired")
-    required = document.get("extensionsRequired")
     lean = dict.fromkeys(names, required) if required else {}
     top = {"extras": document["scenes"][0]["extras"]}
     lean = {"asset": {"version": "2.0"}} | lean | {"scenes": [top]}
@@ -173,7 +176,7 @@ def _look(material: Mapping[str, Any], of_object: Mapping[str, Any]) -> dict[str
     surface = material["pbrMetallicRoughness"]
     extras = {**of_object, **material.get("extras", {})}
     for name, members, source in (
-        ("pbrMetallicRoughness", _SURFACE, surface),
+        ("pbrMetallicRoughness", _SURFACE + _GLOSS * ("probe" in extras), surface),
         ("extras", _EXTRAS, extras),
     ):
         if kept := {member: source[member] for member in members if member in source}:
