@@ -4,13 +4,14 @@
         [--width 320] [--height 180] [--light none auto] [--out FOLDER]
 
 Mitsuba 3 traces the reference with all bounces, from the model's own file (`lit_model`). Panes let
-light pass but for their opacity. Each view is traced in passes, and Open Image Denoise removes
-grain, until the standard error of the displayed picture is at most ``--noise`` of 255, or there are
-as many passes as `_PASSES` allows.
+light pass but for their opacity. Ceilings that glow by default light, but do not show it. Each view
+is traced in passes, and Open Image Denoise removes grain, until the standard error of the displayed
+picture is at most ``--noise`` of 255, or there are as many passes as `_PASSES` allows.
 
 Exposure takes the mean of the reference's log luminance to `KEY`; then come the curve Khronos PBR
 Neutral and sRGB. Pictures of ``ptm render`` are compared as they are. *matt* is the same reference
-with all surfaces diffuse: the part of the difference that is light alone. The tables give the root
+with all surfaces diffuse, beside the picture without reflections: the part of the difference that
+is light alone. The tables give the root
 mean square of 255 and FLIP, and the noise of the references; pictures lie beside each other in
 ``--out``.
 
@@ -36,7 +37,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from lit_model import CEILING, SKY, WARM, LitModel, PathLamp
+from lit_model import CEILINGS, LitModel, PathLamp
 from numpy.typing import NDArray
 from PIL import Image
 from scenes import ROOT, model_file
@@ -118,12 +119,17 @@ class PathTracer:
         self.seconds = 0.0
         with tempfile.TemporaryDirectory() as folder:
             self._traced = mitsuba.load_dict(self._description(Path(folder)))
+            self._ceilings = None
+            if model.ceilings.any():
+                ceilings = self._description(Path(folder), ceilings_alone=True)
+                self._ceilings = mitsuba.load_dict(ceilings)
 
     def trace(self, view: EyeView, size: tuple[int, int], noise: float) -> tuple[Floats, float]:
         """(height, width, 3) linear light, and the standard error of its picture, of 255. A view
         that was traced before is read."""
         tracing = _DEPTH, _PATHS, _PASSES, noise
-        key = repr((self._model.digest, self._model.daylight, self._matt, view, size, tracing))
+        glow = self._model.daylight, CEILINGS if self._ceilings else None
+        key = repr((self._model.digest, glow, self._matt, view, size, tracing))
         file = FOLDER / "traced" / f"{sha256(key.encode()).hexdigest()[:16]}.npz"
         if file.is_file():
             with np.load(file) as stored:
@@ -136,6 +142,7 @@ class PathTracer:
     def _trace(self, view: EyeView, size: tuple[int, int], noise: float) -> tuple[Floats, float]:
         begin = process_time()
         passes: list[Floats] = []
+        shine = self._shine(view, size)
         least, most = _PASSES
         error = math.inf
         while error > noise and len(passes) < most:
@@ -148,6 +155,7 @@ class PathTracer:
                 seed=len(passes),
             )
             passes.append(np.nan_to_num(np.array(picture, np.float32)))
+            passes[-1][..., :3] = np.maximum(passes[-1][..., :3] - shine, 0)
             light = denoise(np.mean(passes, axis=0))
             if len(passes) >= least:
                 exposure = exposure_of(light)
@@ -157,7 +165,20 @@ class PathTracer:
         self.seconds += process_time() - begin
         return light, error
 
-    def _description(self, folder: Path) -> dict[str, Any]:
+    def _shine(self, view: EyeView, size: tuple[int, int]) -> Floats | float:
+        """(height, width, 3) what ceilings that glow show by themselves."""
+        if self._ceilings is None:
+            return 0.0
+        picture = self._mitsuba.render(
+            self._ceilings,
+            sensor=self._mitsuba.load_dict(self._sensor(view, size)),
+            integrator=self._mitsuba.load_dict({"type": "path", "max_depth": 1}),
+            spp=4 * _PATHS,
+        )
+        return np.array(picture, np.float32)
+
+    def _description(self, folder: Path, *, ceilings_alone: bool = False) -> dict[str, Any]:
+        """The scene for Mitsuba; with ``ceilings_alone``, nothing else sends light."""
         model = self._model
         description: dict[str, Any] = {"type": "scene"}
         for k, material in enumerate(model.scene.materials):
@@ -170,10 +191,12 @@ class PathTracer:
                     continue
                 shape = self._shape(folder / f"{k}-{glowing}.ply", np.flatnonzero(faces))
                 shape["bsdf"] = _pane(material) if pane else self._surface(material)
-                radiance = CEILING * SKY * WARM if glowing else model.emission(material)
-                if radiance.any():
+                radiance = CEILINGS if glowing else model.emission(material)
+                if radiance.any() and (glowing or not ceilings_alone):
                     shape["emitter"] = {"type": "area", "radiance": rgb(radiance)}
                 description[f"material_{k}_{glowing}"] = shape
+        if ceilings_alone:
+            return description
         # The sky above the horizon, and the ground below it.
         around = np.repeat(np.array(model.daylight, np.float32), _ENVIRONMENT, axis=0)
         bitmap = self._mitsuba.Bitmap(np.repeat(around[:, None], 2 * len(around), axis=1))

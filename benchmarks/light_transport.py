@@ -29,7 +29,7 @@ from light_reference import (
     rms,
     views_of,
 )
-from lit_model import CEILING, SKY, WARM, LitModel
+from lit_model import CEILINGS, LitModel
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -148,7 +148,7 @@ def luminous(model: LitModel) -> Floats:
     """(T, 3) nits of each face."""
     emission = np.array([model.emission(material) for material in model.scene.materials])
     glow = emission[model.scene.triangle_material]
-    glow[model.ceilings] = CEILING * SKY * WARM
+    glow[model.ceilings] = CEILINGS
     return np.asarray(glow)
 
 

@@ -2,8 +2,8 @@
 
 Geometry, textures and base colours are those of `ptmtools.scene`; metallic, roughness, emission
 and lamps of a GLB come from its JSON, in colour. A model without lamps has a cloudy sky of `SKY`
-nits outside and ceilings that glow (`CEILING`); one with a sun has a sky of a fifth of its lux. The
-ground lies below the horizon, unshadowed.
+nits outside and ceilings that glow (`CEILING`), as the light stage has by default; one with a sun
+has a sky of a fifth of its lux. The ground lies below the horizon, unshadowed.
 """
 
 from __future__ import annotations
@@ -24,19 +24,17 @@ from ptmtools_samples.lit_hall import corner_normals
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.glb import glb_chunks
+from ptmtools.light.building import BLUE, CEILING, GROUND, SKY, WARM
 from ptmtools.scene import Scene, ingest
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material
 
-#: Nits of a cloudy sky, and its colour; of ceilings the share of it, and their colour.
-SKY, BLUE = 1000.0, np.array([0.85, 1.0, 1.25])
-CEILING, WARM = 0.06, np.array([1.2, 1.0, 0.8])
+#: What ceilings send that glow, nits.
+CEILINGS = CEILING * SKY * WARM
 #: A ceiling faces down, this far above the model's floor, metres.
 _OVER = 2.2
 #: Largest reflectance: with more, light hardly fades.
 _MOST = 0.98
-#: Reflectance of the ground.
-GROUND = 0.3
 #: Texels of an image's longer side.
 _SIDE = 512
 
