@@ -38,6 +38,10 @@ class CellSurfaces:
 
 #: Stops below white that the codes of lightmaps cover.
 STOPS = 10.0
+#: Width and height of the image of a probe, and left, top and side of the map of each roughness,
+#: 0 to 1, texels.
+PROBE_SIZE = 192, 128
+PROBE_MAPS = ((0, 0, 128), (128, 0, 64), (128, 64, 32), (160, 64, 16))
 
 
 def light_codes(light: Floats | Singles, white: float) -> NDArray[np.uint8]:

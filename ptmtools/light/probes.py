@@ -27,16 +27,13 @@ from ptmtools.jit import kernel
 from ptmtools.light.baked import BakedSurfaces
 from ptmtools.light.building import BuildingLight
 from ptmtools.light.lamps import lamps_near
-from ptmtools.light.model import light_codes
+from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE, light_codes
 from ptmtools.light.occlusion import SPREAD
 from ptmtools.scene.colors import luminance
 
 if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
 
-#: Texels of the image, and upper left corner and side of the map of each roughness, 0 to 1.
-WIDTH, HEIGHT = 192, 128
-MAPS = ((0, 0, 128), (128, 0, 64), (128, 64, 32), (160, 64, 16))
 #: Rays for each texel of the sharpest map.
 _RAYS = 4
 #: White is at most this multiple of the median: brighter texels, lamps, would take all stops.
@@ -56,7 +53,7 @@ class Probe:
 
     Attributes
     ----------
-    texels: (HEIGHT, WIDTH, 3) codes.
+    texels: (128, 192, 3) codes.
     white: of the codes. mean: luminance over all directions.
     centre, low, high: (3,) metres, the point, and the corners of the box.
     """
@@ -88,7 +85,7 @@ class ProbeBaking:
     def probe(self, candidates: Floats) -> Probe:
         """The probe at the best of (n, 3) points."""
         centre = self._most_open(candidates)
-        way, solid = directions(MAPS[0][2] - 2, _RAYS)
+        way, solid = directions(PROBE_MAPS[0][2] - 2, _RAYS)
         seen, distance = self._look(centre, way)
         low, high = _box(centre, way, distance)
         light = seen.reshape(-1, _RAYS, 3).mean(axis=1)
@@ -98,9 +95,9 @@ class ProbeBaking:
         middle = float(np.median(light.max(axis=1)))
         white = max(texels.max() for texels in maps)
         white = float(f"{min(white, _BRIGHTEST * middle) if middle > 0 else white:.3g}") or 1.0
-        image = np.full((HEIGHT, WIDTH, 3), 255, np.uint8)
+        image = np.full((*PROBE_SIZE[::-1], 3), 255, np.uint8)
         image[:] = light_codes(light.mean(axis=0), white)
-        for (left, top, side), texels in zip(MAPS, maps, strict=True):
+        for (left, top, side), texels in zip(PROBE_MAPS, maps, strict=True):
             codes = light_codes(texels.reshape(side - 2, side - 2, 3), white)
             image[top : top + side, left : left + side] = with_border(codes)
         return Probe(image, white, mean, centre, low, high)
@@ -200,13 +197,13 @@ def _octahedron(place: Floats) -> Floats:
 
 def _prefilter(light: Floats) -> list[Floats]:
     """(m, 3) each of the maps but the first, for (n, 3) light of the first."""
-    side = MAPS[0][2] - 2
+    side = PROBE_MAPS[0][2] - 2
     # No lobe is as narrow as two texels.
     blocks = light.reshape(side // 2, 2, side // 2, 2, 3)
     source = np.ascontiguousarray(blocks.mean(axis=(1, 3)).reshape(-1, 3))
     result = []
-    for number, (_, _, target) in enumerate(MAPS[1:], 1):
-        alpha = (number / (len(MAPS) - 1)) ** 2
+    for number, (_, _, target) in enumerate(PROBE_MAPS[1:], 1):
+        alpha = (number / (len(PROBE_MAPS) - 1)) ** 2
         way, _ = directions(target - 2, 1)
         result.append(filter_lobe(way, *directions(side // 2, 1), source, alpha))
     return result

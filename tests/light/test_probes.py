@@ -12,11 +12,8 @@ from ptmtools.arrays import Floats
 from ptmtools.light.baked import BakedSurfaces, find_pieces
 from ptmtools.light.building import BuildingBaking
 from ptmtools.light.cells import LightBaking
-from ptmtools.light.model import coded_light
+from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE, coded_light
 from ptmtools.light.probes import (
-    HEIGHT,
-    MAPS,
-    WIDTH,
     Probe,
     ProbeBaking,
     directions,
@@ -24,7 +21,7 @@ from ptmtools.light.probes import (
     with_border,
 )
 from ptmtools.scene.lights import Lamp, Lights
-from tests.light.test_cells import HEIGHT as ROOM_HEIGHT, OPTIONS, SIDE, piece, room, scene_of
+from tests.light.test_cells import HEIGHT, OPTIONS, SIDE, piece, room, scene_of
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 
@@ -50,14 +47,14 @@ def probe() -> Probe:
 
 def seen(probe: Probe, *way: float) -> Floats:
     """(3,) the radiance from a direction, by the sharpest map."""
-    side = MAPS[0][2] - 2
+    side = PROBE_MAPS[0][2] - 2
     nearest = int(np.argmax(directions(side, 1)[0] @ np.array(way)))
     row, column = divmod(nearest, side)
     return coded_light(probe.texels[row + 1, column + 1], probe.white)
 
 
 def test_a_probe_shows_what_is_around_it(probe: Probe) -> None:
-    assert probe.texels.shape == (HEIGHT, WIDTH, 3)
+    assert probe.texels.shape == (*PROBE_SIZE[::-1], 3)
     red = seen(probe, -1, 0, 0)
     assert red[0] > 5 * red[1]
     grey = seen(probe, 1, 0, 0)
@@ -66,12 +63,12 @@ def test_a_probe_shows_what_is_around_it(probe: Probe) -> None:
 
 def test_the_box_is_the_room(probe: Probe) -> None:
     assert probe.low == pytest.approx([0, 0, 0], abs=1e-3)
-    assert probe.high == pytest.approx([SIDE, ROOM_HEIGHT, SIDE], abs=1e-3)
+    assert probe.high == pytest.approx([SIDE, HEIGHT, SIDE], abs=1e-3)
 
 
 def test_rougher_maps_are_more_even(probe: Probe) -> None:
     spreads = []
-    for left, top, side in MAPS:
+    for left, top, side in PROBE_MAPS:
         codes = probe.texels[top + 1 : top + side - 1, left + 1 : left + side - 1]
         spreads.append(np.log2(coded_light(codes, probe.white)).std())
     assert spreads == sorted(spreads, reverse=True)
