@@ -25,8 +25,9 @@ from ptmtools.light.looks import LightImage, lookup
 from ptmtools.light.model import CellSurfaces, coded_light
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
+from ptmtools.pipeline.encoding import lossy_codes
 from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE
-from ptmtools.pipeline.stages.light import light_baking, lossy_light, unlit_materials
+from ptmtools.pipeline.stages.light import QUALITY, light_baking, unlit_materials
 from ptmtools.pipeline.stages.scene import lights_of, scene_origin
 from ptmtools.scene.colors import luminance, to_linear
 from ptmtools_lab.tradeoff.experiment import (
@@ -101,7 +102,7 @@ def lightmap_experiment(
         chosen = [pieces(options.light_density)[cell] for cell in cells]
         with_options = replace(baking, options=options)
         made, seconds = time_work(lambda: [with_options.light(piece) for piece in chosen])
-        images = [b"" if k.texels is None else lossy_light(k.texels)[1] for k in made]
+        images = [b"" if k.texels is None else lossy_codes(k.texels, QUALITY)[1] for k in made]
         rows = zip(made, images, chosen, places, strict=True)
         shown = np.concatenate(
             [_shown_light(light, image, piece, *place) for light, image, piece, place in rows]

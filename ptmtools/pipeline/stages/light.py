@@ -83,14 +83,14 @@ def bake_cell(
     light = shared.baking.light(piece)
     if light.texels is None:
         return (light, 0), []
-    name, data = lossy_codes(light.texels, _QUALITY)
+    name, data = lossy_codes(light.texels, QUALITY)
     files = encode_image(shared.options, f"{lightmap_stem(cell)}.{name}", data)
     return (light, sum(len(part) for file, part in files if file.startswith(f"{SERVED}/"))), files
 
 
 #: Quality of the images of lightmaps. (WebP 85 takes a quarter more bytes, and has blocks on smooth
 #: walls.)
-_QUALITY = {"avif": 85, "webp": 90}
+QUALITY = {"avif": 85, "webp": 90}
 
 
 def lightmap_stem(cell: int) -> str:
