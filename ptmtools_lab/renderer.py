@@ -10,11 +10,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.light.model import PROBE_SIZE
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.rays import Caster, RayCamera
-from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels
+from ptmtools.rendering.records import Shows, Sight, Triangles, image_of, own_levels
 from ptmtools.rendering.tone import LitSurfaces, show_vertex_light, tone_at
 from ptmtools_lab.lossy import pictures
 
@@ -87,8 +89,11 @@ class FrameRenderer:
                 shade(part, maps, shows, loaded, column, result)
                 return result
 
+            def images(texture: int) -> NDArray[np.uint8] | None:
+                return image_of(shows, column, texture, PROBE_SIZE)
+
             missing = (sight.triangle >= 0) & ~loaded[self._triangles.cell[sight.triangle]]
-            self._light.show(sight, tone, codes, shown)
+            self._light.show(sight, tone, codes, images, shown)
             shown[missing] = GREY
         show_bumps(sight, surfaces, shows, loaded, column, shown)
         return self._picture(shown)

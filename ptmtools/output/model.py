@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
+from ptmtools.light.model import PROBE_SIZE
 from ptmtools.options import degrees_text, option
 
 if TYPE_CHECKING:
@@ -113,6 +114,23 @@ def offsets_of(row: Mapping[str, Any]) -> list[int]:
     levels without."""
     offsets, count = row.get("offsets", ()), len(sizes_of(row))
     return [*offsets[:count], *([0] * (count - len(offsets)))]
+
+
+def probe_fault(row: Mapping[str, Any], cells: int) -> tuple[str, str]:
+    """The member of a row of `textures` that is wrong for a probe, and a message; two empty texts
+    if it is right, or no probe. ``cells``: their number."""
+    probe = row.get("probe")
+    if probe is None:
+        return "", ""
+    if probe["cell"] >= cells:
+        return "probe.cell", f"the index {probe['cell']} is out of range"
+    if any(a > b for a, b in zip(probe["low"], probe["high"], strict=True)):
+        return "probe.low", "is above high"
+    if sizes_of(row)[-1] != PROBE_SIZE or row["components"] != 3:
+        return "probe", "its image is not one of {} x {} texels in colour".format(*PROBE_SIZE)
+    if "color" not in row:
+        return "color", "is missing of a probe"
+    return "", ""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from ptmtools.files import open_regular
 from ptmtools.output.gltf_reader import ReadGlb, read_glb
 from ptmtools.output.locating import Locator
 from ptmtools.output.mesh_levels import row_fault
-from ptmtools.output.model import FileError, sizes_of
+from ptmtools.output.model import FileError, probe_fault, sizes_of
 from ptmtools.output.names import HINTS, texture_name
 from ptmtools.output.representation import representations
 from ptmtools.output.surfaces import Surfaces, surfaces_of
@@ -106,6 +106,11 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     """
     folder, (index, index_bytes) = _find_index(database)
     names = [cell["name"] for cell in index["cells"]]
+    for number, row in enumerate(index["textures"]):
+        member, message = probe_fault(row, len(names))
+        if member:
+            place = f"textures[{number}].{member}"
+            raise DatabaseError("PTM-D006", message, file=folder / HINTS, place=place, remedy=BUILD)
     pairs = [
         _document(_template_path(folder, index["record"], name), schemas.CELL) for name in names
     ]
@@ -248,7 +253,8 @@ def _glb(file: Path, data: bytes, cell: int, index: Mapping[str, Any]) -> ReadGl
         raise DatabaseError(
             "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
-    named = ((p.material.texture, p.material.light, p.material.normal) for p in read.primitives)
+    materials = [primitive.material for primitive in read.primitives]
+    named = ((m.texture, m.light, m.normal, m.probe) for m in materials)
     used = [number for numbers in named for number in numbers if number is not None]
     out_of_range = max(used, default=-1) >= len(index["textures"])
     for kind in representations():
@@ -256,6 +262,10 @@ def _glb(file: Path, data: bytes, cell: int, index: Mapping[str, Any]) -> ReadGl
         out_of_range |= max(rows, default=-1) >= len(index.get(kind.name, ()))
     if read.cell != cell or out_of_range:
         raise DatabaseError("PTM-D006", "belongs to another cell", file=file, remedy=BUILD)
+    for material in materials:
+        if material.probe is not None and "probe" not in index["textures"][material.probe]:
+            message = f"texture {material.probe} of the hints is not a probe"
+            raise DatabaseError("PTM-D006", message, file=file, place="materials", remedy=BUILD)
     return read
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.output.gltf import WRAPS
-from ptmtools.output.gltf_reader import ReadGlb, ReadPrimitive
+from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
 from ptmtools.output.locating import SLACK, Locator
 from ptmtools.scene.colors import to_srgb
 
@@ -59,6 +59,21 @@ class Bumps:
 
 
 @dataclass(frozen=True)
+class Gloss:
+    """What triangles reflect.
+
+    Attributes
+    ----------
+    probe: (n,) int32, the probe in the hints' textures, -1 of those that do not reflect.
+    metallic, roughness: (n,) of the material, 0 to 1.
+    """
+
+    probe: NDArray[np.int32]
+    metallic: Floats
+    roughness: Floats
+
+
+@dataclass(frozen=True)
 class Surfaces:
     """All triangles that are drawn, in the order of their cells.
 
@@ -79,6 +94,7 @@ class Surfaces:
     white: (n,) the light of which the codes of lightmaps, and of those without one the colours of
         corners, are shares; 0 of what is not lit. None if nothing is.
     relief: the normal maps of objects, if there are any. bumps: those of materials.
+    gloss: what reflects, if anything does.
     normals: (n, 3, 3) float32 unit normals of the corners, 0 of flat triangles; None if all are.
     opacity: (n,) of the factor, 0 to 1.
     transparent: (n,) whether it, and the alpha of the texture, count. cutoff: (n,) of those
@@ -102,6 +118,7 @@ class Surfaces:
     white: Floats | None = None
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
+    gloss: Gloss | None = None
     normals: NDArray[np.float32] | None = None
     vertex_colors: Floats | None = None
     opacity: Floats | None = None
@@ -238,6 +255,7 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         else None,
         relief=_relief([p for _, p in shapes]),
         bumps=bumps_of([p for _, p in shapes], count),
+        gloss=_gloss(materials, count),
         normals=_normals([p for _, p in shapes]),
         vertex_colors=None if all(p.color is None for _, p in shapes) else vertex_colors,
         opacity=spread([m.factor[3] for m in materials], np.float64),
@@ -246,6 +264,14 @@ def surfaces_of(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
             [0 if m.cutoff is None else max(m.cutoff, LEAST_ALPHA) for m in materials], np.float64
         ),
     )
+
+
+def _gloss(materials: list[ReadMaterial], count: list[int]) -> Gloss | None:
+    if all(m.probe is None for m in materials):
+        return None
+    probe = np.array([-1 if m.probe is None else m.probe for m in materials], np.int32)
+    finish = np.array([[m.metallic, m.roughness] for m in materials], np.float64)
+    return Gloss(np.repeat(probe, count), *np.repeat(finish, count, axis=0).T)
 
 
 def _normals(shapes: list[ReadPrimitive]) -> NDArray[np.float32] | None:

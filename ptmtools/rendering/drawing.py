@@ -162,7 +162,7 @@ def draw_view(
     sight, layers = Layers(surfaces).split(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))
     shown = painter.colors(sight)
-    blend(layers, sight, painter.colors, shown)
+    blend(layers, sight, painter.layer, shown)
     grid = (options.height, samples, options.width, samples, 3)
     return as_bytes(shown.reshape(grid).mean(axis=(1, 3)))
 

@@ -4,6 +4,7 @@ colours of vertices there."""
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, cross
 from ptmtools.rendering.records import Sight, Triangles
@@ -47,17 +48,27 @@ def show_colors(
     shown[pixel] *= np.divide(interpolated, mean, out=np.zeros_like(interpolated), where=mean > 0)
 
 
-def corner_values(sight: Sight, pixel: Ints, triangles: Triangles, values: Floats) -> Floats:
+def corner_values(
+    sight: Sight, pixel: Ints, triangles: Triangles, values: NDArray[np.floating]
+) -> Floats:
     """(n, 3) between the ``values`` (T, 3, 3) of the corners of the triangles that some pixels
     show."""
     shown = values[sight.triangle[pixel]]
-    result: Floats = shown[:, 0]
+    result = shown[:, 0].astype(np.float64)
     rows = np.flatnonzero((shown != shown[:, :1]).any(axis=(1, 2)))
     result[rows] = _interpolate(sight, pixel[rows], triangles, values)
     return result
 
 
-def _interpolate(sight: Sight, pixel: Ints, triangles: Triangles, values: Floats) -> Floats:
+def surface_points(sight: Sight, pixel: Ints, triangles: Triangles) -> Floats:
+    """(n, 3) world points of the triangles that some pixels show, metres."""
+    at = _intersections(sight, pixel, triangles)[2]
+    return np.asarray(at + triangles.corner[sight.triangle[pixel], 0])
+
+
+def _interpolate(
+    sight: Sight, pixel: Ints, triangles: Triangles, values: NDArray[np.floating]
+) -> Floats:
     """(n, 3) of pixels between the (T, 3, 3) values of corners; of a triangle without area that of
     its first corner."""
     triangle = sight.triangle[pixel]

@@ -32,9 +32,11 @@ _BATCH = 1 << 18
 #: Least length of a normal, m²: a triangle without area has none.
 _FLAT = 1e-300
 
-#: (m,) alpha of the textures at the pixels of a sight, 0 to 1; (m, 3) colours of these.
+#: (m,) alpha of the textures at the pixels of a sight, 0 to 1.
 Alpha = Callable[[Sight], Floats]
-Colors = Callable[[Sight], Floats]
+#: Of the pixels of a sight and their (m, 1) shares: (m, 3) colours to be added, 0 to 255, and
+#: (m, 1) the shares of what is behind that these replace.
+Paint = Callable[[Sight, Floats], tuple[Floats, Floats]]
 
 
 class Layer(NamedTuple):
@@ -159,13 +161,13 @@ class Layers:
         return share
 
 
-def blend(layers: Sequence[Layer], sight: Sight, colors: Colors, shown: Floats) -> None:
+def blend(layers: Sequence[Layer], sight: Sight, paint: Paint, shown: Floats) -> None:
     """Blends the layers before a sight over the (n, 3) colours ``shown`` of its pixels, one at a
     time, the farthest first."""
     for ray, triangle, share in reversed(layers):
-        part = share[:, None].astype(np.float64)
-        color = colors(sight._replace(triangle=triangle.astype(np.int64), ray=sight.ray[ray]))
-        shown[ray] = shown[ray] * (1 - part) + color * part
+        part = sight._replace(triangle=triangle.astype(np.int64), ray=sight.ray[ray])
+        color, alpha = paint(part, share[:, None].astype(np.float64))
+        shown[ray] = shown[ray] * (1 - alpha) + color
 
 
 def _distance(eye: Floats, along: Floats, place: Floats, normal: Floats) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.light.model import PROBE_SIZE
 from ptmtools.output.representation import representations_in
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress
@@ -19,7 +20,7 @@ from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.normal_maps import show_bumps, show_relief
 from ptmtools.rendering.pyramids import Texels, alpha_of, read_levels, read_pyramids
-from ptmtools.rendering.records import Shows, Sight, Triangles, own_levels
+from ptmtools.rendering.records import Shows, Sight, Triangles, image_of, own_levels
 from ptmtools.rendering.tone import SKY, LitSurfaces, Tone
 
 
@@ -75,9 +76,7 @@ class SurfacePainter:
 
     def load(self, *triangles: NDArray[np.integer]) -> None:
         """Decodes the textures of all triangles, -1 for none, that `colors` will be asked for."""
-        maps = [self._surfaces.texture]
-        if self._light.lightmaps:
-            maps.append(self._light.lightmaps.texture)
+        maps = self._light.textures.copy()
         if self._lit and self._surfaces.relief:
             maps.append(self._surfaces.relief.number)
         if self._surfaces.bumps:
@@ -111,9 +110,16 @@ class SurfacePainter:
             show_colors(sight, triangles, surfaces.vertex_colors, shown)
             shown[sight.triangle < 0] = SKY
         else:
-            self._light.show(sight, self._tone, self._codes, shown)
+            self._light.show(sight, self._tone, self._codes, self._image, shown)
         show_bumps(sight, surfaces, shows, loaded, column, shown)
         return shown
+
+    def layer(self, sight: Sight, share: Floats) -> tuple[Floats, Floats]:
+        """See `ptmtools.rendering.layers.Paint`."""
+        return self._light.layer(sight, self._tone, self._image, share, self.colors(sight))
+
+    def _image(self, texture: int) -> Texels | None:
+        return image_of(self._shows, self._column, texture, PROBE_SIZE)
 
     def _codes(self, sight: Sight, maps: Triangles) -> Floats:
         """(n, 3) of lightmaps, 0 to 255."""

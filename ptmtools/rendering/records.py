@@ -60,6 +60,21 @@ def own_levels(pyramids: Pyramids) -> Shows:
     return Shows(pyramids, row, finest, pyramids.levels, pyramids.mean)
 
 
+def image_of(
+    shows: Shows, column: Ints, texture: int, size: tuple[int, int]
+) -> NDArray[np.uint8] | None:
+    """(height, width, 3) the finest image of a texture in its loaded ``column``; None of another
+    ``size`` or without one."""
+    at = texture, column[texture]
+    row, level = shows.row[at], shows.held[at] - 1
+    pyramids = shows.pyramids
+    if level < 0 or tuple(pyramids.size[row, level].tolist()) != size:
+        return None
+    start = pyramids.start[row, level]
+    width, height = size
+    return pyramids.texel[start : start + 3 * width * height].reshape(height, width, 3)
+
+
 class Triangles(NamedTuple):
     """Drawn triangles.
 

@@ -24,6 +24,7 @@ from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.footprints import corner_values, show_colors
 from ptmtools.rendering.records import Sight, Triangles, triangles_of
+from ptmtools.rendering.reflection import Images, Panorama, Reflections
 from ptmtools.scene.colors import to_linear, to_srgb
 
 #: Colour of the background in buildings without light, 0 to 255, as on the web page.
@@ -106,7 +107,8 @@ def tone_at(served: Served, eye: Floats, cell: int | None = None) -> Tone | None
 
 def neutral(radiance: Floats) -> Floats:
     """(n, 3) linear light of the screen, 0 to 1, of (n, 3) radiance from 0 on."""
-    result, peak = radiance.copy(), radiance.max(axis=1)
+    # Of few columns, three times as fast as `max`.
+    result, peak = radiance.copy(), np.maximum(np.maximum(*radiance.T[:2]), radiance[:, 2])
     bright = np.flatnonzero(peak > SHOULDER)
     peak, room = peak[bright, None], 1 - SHOULDER
     compressed = 1 - room * room / (peak + room - SHOULDER)
@@ -123,16 +125,24 @@ class LitSurfaces:
     ----------
     triangles: all; lit ones are white, so that they are sampled as their texels are.
     lightmaps: all with lightmaps as their textures; None if there are none.
+    reflections: of them and of panes; None if nothing reflects.
+    textures: (T,) numbers each, -1 for none: of all textures, lightmaps and probes.
     """
 
     def __init__(self, served: Served) -> None:
         surfaces, self._white = served.surfaces, _whites(served)
         self.triangles, self._vertex_colors = triangles_of(surfaces), surfaces.vertex_colors
         self.lightmaps: Triangles | None = None
+        self.reflections: Reflections | None = None
+        self.textures = [self.triangles.texture]
+        if surfaces.gloss and served.index.get("light", {}).get("tone") == "neutral":
+            self.reflections = Reflections(surfaces, self.triangles, served.index)
+            self.textures.append(self.reflections.probe)
         if not (lit := self._white > 0).any():
             return
         if light := surfaces.light:
             self.lightmaps = triangles_of(light)
+            self.textures.append(self.lightmaps.texture)
         #: (T, 3) linear factors of the texels; (T, 3, 3) of the corners, unlit ones are white.
         self._factor = to_linear(_factors(surfaces))
         self._corner_colors: Floats | None = None
@@ -143,7 +153,9 @@ class LitSurfaces:
         color = np.where(lit[:, None], 1.0, surfaces.color)
         self.triangles = self.triangles._replace(color=color)
 
-    def show(self, sight: Sight, tone: Tone | None, codes: Codes, shown: Floats) -> None:
+    def show(
+        self, sight: Sight, tone: Tone | None, codes: Codes, images: Images, shown: Floats
+    ) -> None:
         """Turns pixels ``shown`` (n, 3) from the texels, or white, times the colours of `triangles`
         to what is displayed; those of the background as well. All are 0 to 255."""
         hit = np.flatnonzero(sight.triangle >= 0)
@@ -151,8 +163,11 @@ class LitSurfaces:
         self._show_plain(sight, hit[~lit], GLOW if tone is None else LIT_GLOW, shown)
         if tone:
             pixel = hit[lit]
+            probes: dict[int, Panorama] = {}
+            if self.reflections:
+                probes = self.reflections.probes(sight.triangle[pixel], images)
             for begin in range(0, len(pixel), _BLOCK):
-                self._show_light(sight, pixel[begin : begin + _BLOCK], tone, codes, shown)
+                self._show_light(sight, pixel[begin : begin + _BLOCK], tone, codes, probes, shown)
         show_colors(sight, self.triangles, self._vertex_colors, shown)
         outside = np.flatnonzero(sight.triangle < 0)
         shown[outside] = tone.background_colors(sight.ray[outside]) if tone else SKY
@@ -168,7 +183,13 @@ class LitSurfaces:
         shown[pixel] *= (glow + (1 - glow) * facing)[:, None]
 
     def _show_light(
-        self, sight: Sight, pixel: Ints, tone: Tone, codes: Codes, shown: Floats
+        self,
+        sight: Sight,
+        pixel: Ints,
+        tone: Tone,
+        codes: Codes,
+        probes: Mapping[int, Panorama],
+        shown: Floats,
     ) -> None:
         triangle = sight.triangle[pixel]
         base = to_linear(shown[pixel] / 255) * self._factor[triangle]
@@ -178,7 +199,32 @@ class LitSurfaces:
         if self.lightmaps is not None:
             part = sight._replace(triangle=triangle, ray=sight.ray[pixel])
             code = codes(part, self.lightmaps)
-        shown[pixel] = tone.display(base * tone.light(self._white[triangle], code))
+        light = tone.light(self._white[triangle], code)
+        if probes and self.reflections:
+            radiance = self.reflections.light_up(sight, pixel, probes, base, light)
+        else:
+            radiance = base * light
+        shown[pixel] = tone.display(radiance)
+
+    def layer(
+        self, sight: Sight, tone: Tone | None, images: Images, share: Floats, shown: Floats
+    ) -> tuple[Floats, Floats]:
+        """(n, 3) colours and (n, 1) shares with which the pixels ``shown`` (n, 3) of a layer, whose
+        (n, 1) shares are their opacity, are added to those behind: panes reflect.
+
+        What is behind a pane is displayed before the pane is there, so what it reflects is the
+        difference that it makes to the light that is expected there."""
+        color, alpha = shown * share, share
+        if tone and self.reflections:
+            alpha = share.copy()
+            probes = self.reflections.probes(sight.triangle, images)
+            for pixel, part, mirrored, behind in self.reflections.panes(sight, probes):
+                passed = 1 - part[:, None]
+                glare = tone.display(behind * passed + mirrored * part[:, None])
+                glare -= passed * tone.display(behind)
+                color[pixel] = color[pixel] * passed + np.maximum(glare, 0)
+                alpha[pixel] = 1 - passed * (1 - share[pixel])
+        return color, alpha
 
 
 def show_vertex_light(served: Served) -> Served:
@@ -192,7 +238,7 @@ def show_vertex_light(served: Served) -> Served:
         light = white[at_vertices, None, None] * to_linear(colors[at_vertices])
         colors[at_vertices] = tone.display(light.reshape(-1, 3)).reshape(light.shape) / 255
         color[at_vertices] = _factors(surfaces)[at_vertices] * colors[at_vertices].mean(axis=1)
-    unlit = replace(surfaces, white=None, color=color, vertex_colors=colors)
+    unlit = replace(surfaces, white=None, gloss=None, color=color, vertex_colors=colors)
     return replace(served, surfaces=unlit)
 
 

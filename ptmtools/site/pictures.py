@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.light.model import PROBE_SIZE
 from ptmtools.output.model import offsets_of, sizes_of
 from ptmtools.output.served import Served
 from ptmtools.parallel import map_in_order
@@ -137,8 +138,7 @@ class _Scene:
         textures = _Textures(self._served, max(kind.finest for kind, _ in views))
         frames = [self._view(kind, view, textures) for kind, view in views]
         shown = np.unique(np.concatenate([frame.triangles() for frame in frames]))
-        meshes = [mesh for mesh in (self._triangles, self._light.lightmaps) if mesh]
-        numbers = (mesh.texture[shown[shown >= 0]].tolist() for mesh in meshes)
+        numbers = (texture[shown[shown >= 0]].tolist() for texture in self._light.textures)
         textures.read({number for group in numbers for number in group} - {-1})
         yield from map_in_order(partial(self._jpeg, textures), frames, _THREADS)
 
@@ -149,9 +149,8 @@ class _Scene:
         return _View(kind, sight, layers, tone)
 
     def _jpeg(self, textures: _Textures, view: _View) -> bytes:
-        paint = partial(self._colors, textures, view.tone)
-        colors = paint(view.sight)
-        blend(view.layers, view.sight, paint, colors)
+        colors = self._colors(textures, view.tone, view.sight)
+        blend(view.layers, view.sight, partial(self._layer, textures, view.tone), colors)
         return jpeg(colors, view.kind.size, view.kind.most)
 
     def _colors(self, textures: _Textures, tone: Tone | None, sight: Sight) -> Floats:
@@ -159,8 +158,16 @@ class _Scene:
         colors = _texels(textures, sight, self._triangles)
         hit = np.flatnonzero(sight.triangle >= 0)
         colors[hit] *= self._triangles.color[sight.triangle[hit]]
-        self._light.show(sight, tone, partial(_texels, textures), colors)
+        codes, images = partial(_texels, textures), partial(_image, textures)
+        self._light.show(sight, tone, codes, images, colors)
         return colors
+
+    def _layer(
+        self, textures: _Textures, tone: Tone | None, sight: Sight, share: Floats
+    ) -> tuple[Floats, Floats]:
+        """See `ptmtools.rendering.layers.Paint`."""
+        colors = self._colors(textures, tone, sight)
+        return self._light.layer(sight, tone, partial(_image, textures), share, colors)
 
 
 def jpeg(colors: Floats, size: tuple[int, int], limit: int) -> bytes:
@@ -225,6 +232,12 @@ def _texels(textures: Mapping[int, Levels], sight: Sight, triangles: Triangles) 
         if len(rows):
             colors[rows] = _sample_texels(sight, rows, triangles, levels)[:, :3]
     return colors
+
+
+def _image(textures: Mapping[int, Levels], number: int) -> NDArray[np.uint8] | None:
+    """The finest level of a probe; None if it was not read."""
+    finest = textures[number][-1]
+    return finest if finest.shape[1::-1] == PROBE_SIZE else None
 
 
 def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:

@@ -68,7 +68,7 @@ def shown(
         sight, lambda at: np.ones(0) if alpha is None else alpha[at.triangle]
     )
     result = colors(sight)
-    blend(layers, sight, colors, result)
+    blend(layers, sight, lambda at, share: (colors(at) * share, share), result)
     return result
 
 
@@ -158,14 +158,14 @@ def test_layers_are_painted_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("ptmtools.rendering.layers._BATCH", 7)
     surfaces, sizes = panes(PANES), list[int]()
 
-    def colors(sight: Sight) -> Floats:
+    def paint(sight: Sight, share: Floats) -> tuple[Floats, Floats]:
         sizes.append(len(sight.ray))
-        return surfaces.color[sight.triangle]
+        return surfaces.color[sight.triangle] * share, share
 
     camera = RayCamera(6, 4, 1.2, 1.5)
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, np.zeros(3), AHEAD)
     sight, layers = Layers(surfaces).split(sight, lambda at: np.ones(len(at.ray)))
-    blend(layers, sight, colors, np.zeros((24, 3)))
+    blend(layers, sight, paint, np.zeros((24, 3)))
     assert sizes == [3, 3, 7, 7, 7, 7, 7, 7]
     assert sum(array.nbytes for layer in layers for array in layer) == 12 * 2 * 24
 
@@ -179,7 +179,7 @@ def test_light_falls_with_the_angle() -> None:
     sight, layers = Layers(surfaces).split(sight, painter.alpha)
     painter.load(sight.triangle, *(layer.triangle for layer in layers))
     actual = np.zeros((25, 3))
-    blend(layers, sight, painter.colors, actual)
+    blend(layers, sight, painter.layer, actual)
     cosine = 1 / np.linalg.norm(sight.ray, axis=1)
     expected = 255 * 0.25 * (GLOW + (1 - GLOW) * cosine)
     np.testing.assert_allclose(actual[:, 0], expected, rtol=1e-6)

@@ -62,6 +62,7 @@ def _faults(
         *forms,
         ("mesh", material.mesh, meshes, "materials"),
         ("lightmap", material.light, textures, "materials"),
+        ("probe", material.probe, textures, "materials"),
         (normals, material.normal, textures, primitive.place),
     ):
         if number is None:
@@ -70,6 +71,9 @@ def _faults(
             yield "PTM-D704", place, f"the hints have no {noun} {number}"
         elif noun == "lightmap" and rows[number].get("light") != cell:
             message = f"texture {number} of the hints is not the lightmap of this cell"
+            yield "PTM-D731", place, message
+        elif noun == "probe" and rows[number].get("probe", {}).get("cell") != cell:
+            message = f"texture {number} of the hints is not the probe of this cell"
             yield "PTM-D731", place, message
         elif noun == "normal map" and rows[number].get("relief") != primitive.object:
             message = f"texture {number} of the hints is not the normal map of the object"

@@ -12,7 +12,7 @@ from ptmtools import schemas
 from ptmtools.diagnostics import Place
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.mesh_levels import row_fault
-from ptmtools.output.model import FileError, convert_shape_errors, sizes_of
+from ptmtools.output.model import FileError, convert_shape_errors, probe_fault, sizes_of
 from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
 from ptmtools.output.representation import representations_in
 from ptmtools.output.validation.files import ReadHints, Row, ServedDatabase
@@ -177,6 +177,9 @@ def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
     files = database.resolve_each(HINTS, "textures", [row["file"] for row in rows])
     for i, (row, file) in enumerate(zip(rows, files, strict=True)):
         at = database.place(HINTS, f"textures[{i}]")
+        member, message = probe_fault(row, len(hints.index["cells"]))
+        if member:
+            at.add("PTM-D700", message, f"textures[{i}].{member}")
         if complete and i not in used:
             at.add("PTM-D708", f"no cell uses {row['file']}")
         urls = (row["fallback"], *(preview["file"] for preview in row.get("previews", ())))
