@@ -9,11 +9,11 @@ is traced in passes, and Open Image Denoise removes grain, until the standard er
 picture is at most ``--noise`` of 255, or there are as many passes as `_PASSES` allows.
 
 Exposure takes the mean of the reference's log luminance to `KEY`; then come the curve Khronos PBR
-Neutral and sRGB. Pictures of ``ptm render`` are compared as they are. *matt* is the same reference
-with all surfaces diffuse, beside the picture without reflections: the part of the difference that
-is light alone. The tables give the root
-mean square of 255 and FLIP, and the noise of the references; pictures lie beside each other in
-``--out``.
+Neutral and sRGB. Pictures of ``ptm render`` have twice the size, and 2 × 2 pixels are averaged:
+a reference of that size would take four times as long. *matt* is the same reference with all
+surfaces diffuse, beside the picture without reflections: the part of the difference that is light
+alone. The tables give the root mean square of 255 and FLIP, and the noise of the references;
+pictures lie beside each other in ``--out``.
 
 Needs ``mitsuba`` and ``pyoidn`` (extra ``reference``). Mitsuba's compiled variant is used where
 ``DRJIT_LIBLLVM_PATH`` names LLVM 16 or later (Debian: ``apt install libllvm19``); else the scalar
@@ -30,7 +30,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from time import process_time
@@ -43,6 +43,8 @@ from PIL import Image
 from scenes import ROOT, model_file
 
 from ptmtools.arrays import Floats, Singles
+from ptmtools.output.served import Served, read_served
+from ptmtools.rendering.drawing import ViewOptions, draw_view
 from ptmtools.rendering.tone import neutral
 from ptmtools.scene.colors import luminance, to_linear, to_srgb
 from ptmtools.scene.model import Material
@@ -358,13 +360,18 @@ def views_of(name: str, database: Path, count: int) -> list[EyeView]:
     return views
 
 
-def render(database: Path, view: EyeView, size: tuple[int, int], file: Path) -> Floats:
-    """The picture of ``ptm render``, 0 to 255."""
-    eye, look = (",".join(f"{v:.6f}" for v in point) for point in (view.eye, view.look))
-    words = ["--eye", eye, "--look", look, "--field-of-view", f"{view.field:.4f}"]
-    ptm("render", database, *words, "--width", size[0], "--height", size[1], "--force", "-o", file)
-    with Image.open(file) as image:
-        return np.asarray(image.convert("RGB"), np.float64)
+def render(served: Served, view: EyeView, size: tuple[int, int]) -> list[Floats]:
+    """The picture of ``ptm render``, 0 to 255, and that without reflections, drawn at twice the
+    size."""
+    eye, look = tuple(view.eye), (view.look[0], view.look[1], view.look[2])
+    options = ViewOptions(
+        eye=eye, look=look, field_of_view=view.field, width=2 * size[0], height=2 * size[1]
+    )
+    matt = replace(served, surfaces=replace(served.surfaces, gloss=None))
+    blocks = size[1], 2, size[0], 2, 3
+    return [
+        draw_view(database, options).reshape(blocks).mean((1, 3)) for database in (served, matt)
+    ]
 
 
 def compare(name: str, given: argparse.Namespace) -> None:
@@ -373,32 +380,36 @@ def compare(name: str, given: argparse.Namespace) -> None:
     databases = {light: database_of(name, model, light) for light in given.light}
     size = given.width, given.height
     views = views_of(name, next(iter(databases.values())), given.views)
+    served = {light: read_served(database) for light, database in databases.items()}
     lit = LitModel(model)
-    tracers = {kind: PathTracer(lit, matt=kind == "matt") for kind in ("whole", "matt")}
-    columns = [f"{light}: {kind}" for light in databases for kind in tracers]
+    whole, matt = (PathTracer(lit, matt=matt) for matt in (False, True))
+    kinds = "whole", "without reflections", "matt"
+    columns = [f"{light}: {kind}" for light in databases for kind in kinds]
     print(
         f"\n## {name}\n\n| view | noise | {' | '.join(columns)} |\n|---|--:|{'--:|' * len(columns)}"
     )
     table = []
     for k, view in enumerate(views):
-        traced = {kind: tracer.trace(view, size, given.noise) for kind, tracer in tracers.items()}
-        file = given.out / f"{Path(name).stem}-{k}.png"
-        shown = {light: render(db, view, size, file) for light, db in databases.items()}
-        pairs = [
-            (displayed(light, exposure_like(light, picture)), picture)
-            for picture in shown.values()
-            for light, _ in traced.values()
-        ]
-        truth = [pair[0] for pair in pairs[-len(traced) :]]
-        row = [(rms(*pair), flip(*pair)) for pair in pairs]
+        (all_light, error), (matt_light, matt_error) = (
+            tracer.trace(view, size, given.noise) for tracer in (whole, matt)
+        )
+        row, beside = [], []
+        for database in served.values():
+            shown, plain = render(database, view, size)
+            pairs = [(all_light, shown), (all_light, plain), (matt_light, plain)]
+            truths = [displayed(light, exposure_like(light, picture)) for light, picture in pairs]
+            row += [
+                (rms(truth, picture), flip(truth, picture))
+                for truth, (_, picture) in zip(truths, pairs, strict=True)
+            ]
+            beside = [shown, truths[0], plain, truths[2]]
         table.append(row)
-        noise = max(error for _, error in traced.values())
-        print(f"| {k} | {noise:.1f} | {' | '.join(cells_of(row))} |", flush=True)
-        beside = np.concatenate([*shown.values(), *truth], axis=1)
-        Image.fromarray(np.rint(beside).astype(np.uint8)).save(file)
+        print(f"| {k} | {max(error, matt_error):.1f} | {' | '.join(cells_of(row))} |", flush=True)
+        picture = np.rint(np.concatenate(beside, axis=1)).astype(np.uint8)
+        Image.fromarray(picture).save(given.out / f"{Path(name).stem}-{k}.png")
     means = [tuple(map(float, pair)) for pair in np.mean(table, axis=0)]
     print(f"| **mean** | | {' | '.join(cells_of(means))} |")
-    print(f"\n{sum(tracer.seconds for tracer in tracers.values()):.0f} s of path tracing (CPU)")
+    print(f"\n{whole.seconds + matt.seconds:.0f} s of path tracing (CPU)")
 
 
 def cells_of(row: Sequence[tuple[float, ...]]) -> list[str]:
@@ -419,7 +430,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=FOLDER / "pictures")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    print("RMS of 255 / FLIP against the path-traced picture, whole and matt")
+    print("RMS of 255 / FLIP against the path-traced picture: whole, and of matt surfaces")
     for name in given.models:
         compare(name, given)
 

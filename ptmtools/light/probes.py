@@ -27,7 +27,7 @@ from ptmtools.jit import kernel
 from ptmtools.light.baked import BakedSurfaces
 from ptmtools.light.building import BuildingLight
 from ptmtools.light.lamps import lamps_near
-from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE, light_codes
+from ptmtools.light.model import STOPS, PROBE_MAPS, PROBE_SIZE, light_codes
 from ptmtools.light.occlusion import SPREAD
 from ptmtools.scene.colors import luminance
 
@@ -95,6 +95,7 @@ class ProbeBaking:
         middle = float(np.median(light.max(axis=1)))
         white = max(texels.max() for texels in maps)
         white = float(f"{min(white, _BRIGHTEST * middle) if middle > 0 else white:.3g}") or 1.0
+        mean = max(mean, white * 2.0**-STOPS)
         image = np.full((*PROBE_SIZE[::-1], 3), 255, np.uint8)
         image[:] = light_codes(light.mean(axis=0), white)
         for (left, top, side), texels in zip(PROBE_MAPS, maps, strict=True):

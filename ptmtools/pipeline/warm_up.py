@@ -2,8 +2,8 @@
 decodes images, and simplifies the building as a statue.
 
 The building has the features that run all kernels: doors in a row, whose edges meet in one line
-(near ties), a solid that stands in a room, and an image large enough for the coder to fit weights.
-Its faces are also simplified with their texture coordinates.
+(near ties), a solid that stands in a room, an image large enough for the coder to fit weights, and
+walls that reflect. Its faces are also simplified with their texture coordinates.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def write_building(folder: Path) -> Path:
     texels = np.random.default_rng(1).integers(0, 32, (TEXELS, TEXELS, 3))
     texels += np.arange(TEXELS)[:, None, None] // 2
     Image.fromarray(texels.astype(np.uint8)).save(folder / "wall.png")
-    (folder / "building.mtl").write_text("newmtl wall\nmap_Kd wall.png\n")
+    (folder / "building.mtl").write_text("newmtl wall\nmap_Kd wall.png\nPr 0.3\n")
     plan = np.array([list(row) for row in PLAN.split()]).T
     walls, slab = plan == "#", plan != ""
     solid = np.stack([slab, walls, walls | (plan == "+"), walls, slab], axis=1)

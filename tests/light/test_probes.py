@@ -89,6 +89,15 @@ def test_a_lamp_without_a_surface_shines_in_it() -> None:
     assert seen(lit, *(way * [1, 1, -1])).max() < lit.white / 8
 
 
+@pytest.mark.parametrize("power", [1e-6, 1e9])
+def test_probes_of_dark_and_dazzling_rooms_are_finite(power: float) -> None:
+    lamp = Lamp("point", (9.0, 9.0, 9.0), intensity=power)  # outside: the room is dark
+    for place in (lamp, replace(lamp, position=(3.0, 2.5, 3.0))):
+        lit = probe_of(room(), np.array([CENTRE]), replace(Lights.none(1), lamps=(place,)))
+        assert 0 < lit.mean < math.inf
+        assert 0 < lit.white < math.inf
+
+
 def test_directions_cover_the_sphere_evenly() -> None:
     way, solid = directions(62, 1)
     assert np.linalg.norm(way, axis=1) == pytest.approx(1)
