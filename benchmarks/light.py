@@ -125,7 +125,9 @@ def redrawn_row(model: Path) -> str:
         corner, atlas.uv, np.zeros(len(area), np.int32), (painted,), np.arange(len(area))
     )
     square, count = 0.0, 0
-    for cell, piece in enumerate(pieces_of(geometry, cells, np.zeros(1, np.bool_), 1.0)):
+    for cell, piece in enumerate(
+        pieces_of(geometry, cells, np.zeros(len(scene.triangles), np.bool_), 1.0)
+    ):
         span = slice(*geometry.triangle_start[geometry.cell_start[cell : cell + 2]].tolist())
         mapped = light.mapped[geometry.cell_start[cell] + piece.shape]
         if not mapped.any():

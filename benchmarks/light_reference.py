@@ -343,7 +343,9 @@ def model_of(name: str) -> Path:
 def database_of(name: str, model: Path, light: str) -> Path:
     """A database of a model with this option of light, built if it is missing."""
     target = FOLDER / f"{Path(name).stem}-{light}.db"
-    ptm("build-scene", model, "-o", target, "--light", light)
+    # Pictures are compared in the light of their rooms.
+    lit = [] if light == "none" else ["--true-colours", "none"]
+    ptm("build-scene", model, "-o", target, "--light", light, *lit)
     return target
 
 

@@ -21,7 +21,8 @@ class CellSurfaces:
     ----------
     corner: (n, 3, 3) float32 metres.
     object, shape: (n,) of the scene; of the cell, ascending.
-    glass: (n,) whether the surface has no light of its own: it is seen through, or glows.
+    glass: (n,) whether the surface has no light of its own: it is seen through, glows, or is shown
+        in its own colours.
     dense: (n,) whether its light is at vertices.
     side: (n,) 1 where the front of a face counts, -1 the back, 0 the more open of the two.
     face: (n,) the triangle of the scene that it is a piece of.

@@ -30,11 +30,18 @@ class LightOptions:
     )
     light_samples: int = option(64, "Number of rays for each texel of a lightmap.")
 
+    true_colours: Literal["works", "none"] = option(
+        "works",
+        "Surfaces that are shown in the colours of their files, whatever the light: works "
+        "(pictures that hang before a wall) or none. Other surfaces reflect the light that is "
+        "baked.",
+    )
+
     def __post_init__(self) -> None:
         require_ranges(
             self, RANGES, "--{name} {value:g} is not possible", "use {least:g} to {most:g}"
         )
-        for field in RANGES:
+        for field in (*RANGES, "true_colours"):
             used = ["auto", "bake"] + ["model"] * (field == "light_density")
             require(
                 (

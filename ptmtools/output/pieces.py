@@ -35,7 +35,7 @@ def pieces_of(
 
     Parameters
     ----------
-    glass: (materials,) whether a material has no light, see `CellSurfaces`.
+    glass: (T,) whether a face of the scene has no light, see `CellSurfaces`.
     texel: metres of a lightmap.
     replaced: the objects with a relief. Their light is at vertices, as that of objects with
         thousands of small triangles.
@@ -56,7 +56,7 @@ def pieces_of(
             corner[a:b],
             number[a:b],
             shape[a:b] - geometry.cell_start[c],
-            glass[geometry.material[shape[a:b]]],
+            glass[face[a:b]],
             relieved[a:b] | _dense(number[a:b], area[a:b], texel),
             side[a:b],
             face[a:b],

@@ -19,15 +19,16 @@ from ptmtools.cells.model import Cells
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tour.model import FORMAT, SCHEMA
-from ptmtools.tour.pictures import PictureFinder, PictureRectangle, first_face
+from ptmtools.tour.pictures import (
+    PictureFinder,
+    PictureRectangle,
+    first_face,
+    images_once,
+    shows_an_image,
+)
 from ptmtools.tour.placing import faces_of_objects
 from ptmtools.tour.writing import format_json
 
-#: Sides of a picture, metres.
-_LEAST, _GREATEST = 0.1, 5.0
-#: Height of its lower edge above the floor, metres; span of its texture coordinates; and number of
-#: objects that may show the same image.
-_HANGS, _SPAN, _COPIES = 0.3, 1.05, 16
 #: Height of a standing visitor's eye, and of the eye region that the floor is searched in, metres.
 _EYE = 1.6
 #: Vertical field of view of a stop, width by height of a narrow window, and the share of the window
@@ -40,8 +41,6 @@ _STEPS = (1.0, 0.85, 1.2, 0.7, 1.5, 0.55, 2.0)
 _TURNS = (0.0, 0.35, -0.35, 0.7, -0.7)
 #: Height above the lowest floor of the views that are tried, metres: a bench is higher.
 _STEP = 0.25
-#: Distance of a point before a picture, metres.
-_BEFORE = 0.1
 _DOWN = np.array([0.0, -1.0, 0.0])
 
 
@@ -85,10 +84,10 @@ def _pictures(scene: Scene, cells: Cells) -> Iterator[Proposal]:
     eyes = _EyeFinder(scene, cells, all_pictures)
     counts = Counter(scene.objects)
     for name, faces in faces_of_objects(scene).items():
-        if not name or counts[name] > 1 or not _shows_an_image(scene, faces, shown):
+        if not name or counts[name] > 1 or not shows_an_image(scene, faces, shown):
             continue
         picture = all_pictures.picture_of(faces)
-        if picture and eyes.hangs(picture):
+        if picture and all_pictures.hangs(picture):
             view = eyes.view_of(picture, faces)
             yield Proposal(name, {"object": name}, view and _row(*view))
 
@@ -113,24 +112,8 @@ def _objects_of_images(scene: Scene) -> Counter[int]:
     count: a hall may have pictures of the same image as its walls."""
     shown: Counter[int] = Counter()
     for faces in faces_of_objects(scene).values():
-        shown.update(_images_once(scene, faces))
+        shown.update(images_once(scene, faces))
     return shown
-
-
-def _images_once(scene: Scene, faces: Ints) -> set[int]:
-    """The images that an object shows once."""
-    images = set()
-    for material in np.unique(scene.triangle_material[faces]).tolist():
-        image = scene.materials[material].image
-        uv = scene.uv[faces[scene.triangle_material[faces] == material]].reshape(-1, 2)
-        if image >= 0 and (np.ptp(uv, axis=0) <= _SPAN).all():
-            images.add(image)
-    return images
-
-
-def _shows_an_image(scene: Scene, faces: Ints, shown: Counter[int]) -> bool:
-    """Whether an object shows an image once that few objects show."""
-    return any(shown[image] <= _COPIES for image in _images_once(scene, faces))
 
 
 class _EyeFinder:
@@ -142,13 +125,6 @@ class _EyeFinder:
         self._middle = (low + high) / 2
         floor = cells.eye_floor
         self._floor = ray_tree((floor if len(floor) else scene.corners) - self._middle)
-
-    def hangs(self, picture: PictureRectangle) -> bool:
-        """Whether a picture has a plausible size and is not a wall."""
-        if not all(_LEAST <= side <= _GREATEST for side in (picture.width, picture.height)):
-            return False
-        before = picture.centre + _BEFORE * picture.normal
-        return self._pictures.first(before, _DOWN)[1] > picture.height / 2 + _HANGS
 
     def view_of(self, picture: PictureRectangle, faces: Ints) -> tuple[Floats, Floats] | None:
         """Eye and direction from which nothing hides the centre of a picture; None if no visitor

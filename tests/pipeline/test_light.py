@@ -243,6 +243,7 @@ def test_density_is_of_all_lightmaps(light: Any) -> None:
         ("none", {"light_density": 4.0}),
         ("model", {"light_samples": 9}),
         ("none", {"light_samples": 9}),
+        ("model", {"true_colours": "none"}),
     ],
 )
 def test_options_of_other_light(light: Any, more: dict[str, Any]) -> None:

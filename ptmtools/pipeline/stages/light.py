@@ -27,7 +27,7 @@ from ptmtools.pipeline.encoding import (
 )
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.probes import LitSurfaces, bake_probes, reflective_materials
+from ptmtools.pipeline.stages.probes import LitSurfaces, bake_probes, reflective_shapes
 from ptmtools.pipeline.stages.scene import (
     SCENE,
     image_bytes,
@@ -169,18 +169,26 @@ def _absence() -> MissingComponentError | None:
     return None
 
 
-def unlit_materials(scene: Scene, lights: Lights | None, *, painted: bool) -> NDArray[np.bool_]:
-    """(M,) the materials without light: those seen through, those whose colours contain it, and
-    those without a lightmap of the model, or that glow."""
+def unlit_faces(
+    scene: Scene, lights: Lights | None, true_colours: str, *, painted: bool
+) -> NDArray[np.bool_]:
+    """(T,) the faces without light: those of works shown in true colours, and those of materials
+    that are seen through, whose colours contain it, without a lightmap of the model, or that glow.
+    """
     import numpy as np
 
     from ptmtools.light.lamps import lamp_radiance
 
-    glass = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
-    if lights is None:
-        return glass
-    dark = glass | lights.unlit
-    return dark | (lights.map < 0 if painted else lamp_radiance(scene, lights).any(axis=1))
+    dark = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
+    if lights is not None:
+        dark |= lights.unlit
+        dark |= lights.map < 0 if painted else lamp_radiance(scene, lights).any(axis=1)
+    unlit = dark[scene.triangle_material]
+    if true_colours == "works" and not painted:
+        from ptmtools.tour.pictures import works_of
+
+        unlit |= works_of(scene)
+    return unlit
 
 
 def _paint(artifacts: Artifacts, lights: Lights) -> PaintedLight:
@@ -267,8 +275,8 @@ def _light_of(
     lights: Sequence[CellLight],
     unlit: NDArray[np.bool_],
 ) -> tuple[Light, int]:
-    """The light of the building with its probes, and the bytes of these. ``unlit``: (M,) the
-    materials without light."""
+    """The light of the building with its probes, and the bytes of these. ``unlit``: (T,) the faces
+    without light."""
     import numpy as np
 
     from ptmtools.light.model import Light
@@ -283,7 +291,8 @@ def _light_of(
         horizon = factor * np.array([daylight.sky, daylight.ground])
         shine = factor * building.shine
         shine /= np.maximum(shine.max(axis=1, keepdims=True), 1)
-        reflects = reflective_materials(scene, unlit)[geometry.material]
+        first = geometry.piece[geometry.triangle_start[:-1]]
+        reflects = reflective_shapes(scene, geometry, unlit[run[CELLS].triangle_source[first]])
         of_cells = np.split(reflects, geometry.cell_start[1:-1])
         chosen = [cell for cell, shapes in enumerate(of_cells) if shapes.any()]
         surfaces = LitSurfaces(building, pieces, lights, _tint(scene), 1 / factor)
@@ -312,7 +321,7 @@ class LightStage(Stage["Light"]):
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
     recipe = 6
-    changed = "glossy surfaces and panes have reflections"
+    changed = "glossy surfaces and panes have reflections; pictures have true colours"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
@@ -369,7 +378,8 @@ class LightStage(Stage["Light"]):
         scene, cells = run[SCENE], run[CELLS]
         lights = lights_of(run)
         model_light = lights if lights and lights.maps and options.light != "bake" else None
-        unlit = unlit_materials(scene, lights, painted=model_light is not None)
+        painted = model_light is not None
+        unlit = unlit_faces(scene, lights, options.true_colours, painted=painted)
         asked = options.light_density
         replaced = scene_origin(run).objects
         geometry = Geometry(scene, cells)

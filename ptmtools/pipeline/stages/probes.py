@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ptmtools.light.cells import CellLight
     from ptmtools.light.model import CellSurfaces, Light
     from ptmtools.light.probes import Probe, ProbeBaking
+    from ptmtools.output.geometry import Geometry
     from ptmtools.scene.model import Scene
     from ptmtools.store.transaction import Transaction
 
@@ -68,16 +69,19 @@ def probe_files(light: Light | None) -> dict[int, str]:
     return {cell: ptm_file(probe_stem(cell)) for cell, white in enumerate(whites) if white}
 
 
-def reflective_materials(scene: Scene, unlit: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(M,) the materials that show a probe: glossy ones with light, and panes. ``unlit``: (M,)
-    those without light."""
+def reflective_shapes(
+    scene: Scene, geometry: Geometry, unlit: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(S,) the shapes that show a probe: glossy ones with light, and panes. ``unlit``: (S,) those
+    without light."""
     import numpy as np
 
     glossy = np.array([m.glossy for m in scene.materials], np.bool_)
     pane = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
     if scene.lights is not None:
         pane &= ~scene.lights.unlit
-    return (glossy & ~unlit) | pane
+    material = geometry.material
+    return np.asarray((glossy[material] & ~unlit) | pane[material])
 
 
 @dataclass(frozen=True)
