@@ -93,12 +93,12 @@ class Light:
     probe: Floats
     toned: bool = True
 
-    def display(self) -> dict[str, Any]:
-        """The member "light" of the hints, see docs/formats/hints.md."""
+    def display(self, tone: str) -> dict[str, Any]:
+        """The member "light" of the hints, see docs/formats/hints.md, with a tone curve."""
         if not self.toned:
             return {"stops": STOPS, "tone": "plain"}
         sky, ground = np.round(self.horizon, 4).tolist()
-        return {"stops": STOPS, "tone": "neutral", "sky": sky, "ground": ground}
+        return {"stops": STOPS, "tone": tone, "sky": sky, "ground": ground}
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The light as plain arrays."""

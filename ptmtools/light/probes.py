@@ -27,7 +27,7 @@ from ptmtools.jit import kernel
 from ptmtools.light.baked import BakedSurfaces
 from ptmtools.light.building import BuildingLight
 from ptmtools.light.lamps import lamps_near
-from ptmtools.light.model import STOPS, PROBE_MAPS, PROBE_SIZE, light_codes
+from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE, STOPS, light_codes
 from ptmtools.light.occlusion import SPREAD
 from ptmtools.scene.colors import luminance
 

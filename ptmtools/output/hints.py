@@ -76,7 +76,7 @@ def index_text(content: Content) -> str:
     if content.options.first_look:
         head["firstLook"] = FIRST_LOOK_FILES
     if light := content.extras.light:
-        head["light"] = light.display()
+        head["light"] = light.display(content.options.tone)
     exposures = significant(light.exposure, NEED_DIGITS) if light else []
     materials = content.scene.materials
     # Images that are normal maps of materials, and nothing else.

@@ -244,6 +244,11 @@ class WriterOptions:
         "Levels of detail of objects with thousands of triangles: auto (clients of the GLBs draw a "
         "simplified mesh first, and finer ones where the difference can be seen) or none.",
     )
+    tone: Literal["neutral", "agx"] = option(
+        "neutral",
+        "Tone curve of buildings with baked light: neutral (colours stay those of the model up to "
+        "0.8 of white, as pictures want) or agx (softer contrast, as film; bright colours pale).",
+    )
     first_look: int = option(
         0,
         "For each cell, also write one file that holds the levels up to this width and height of "

@@ -8,7 +8,8 @@ colour of the vertex as its base.
 
 The curve "neutral" is Khronos PBR Neutral (https://github.com/KhronosGroup/ToneMapping) without its
 offset of 0.04, which makes up for reflections. It leaves radiance up to 0.8 as it is, so that
-colours stay those of the model; what is brighter is compressed and fades to white.
+colours stay those of the model; what is brighter is compressed and fades to white. "agx" is AgX
+(Troy Sobotka), with its contrast as a polynomial (Benjamin Wrensch, Minimal AgX Implementation).
 """
 
 from __future__ import annotations
@@ -51,13 +52,13 @@ class Tone:
     Attributes
     ----------
     stops: powers of two from code 0 to code 255. exposure: factor of radiance.
-    toned: whether the tone curve applies; else radiance is clipped at 1.
+    curve: of `CURVES`, or "plain": radiance is clipped at 1.
     background: (2, 3) radiance of ground and sky; None: the background is `SKY`.
     """
 
     stops: float
     exposure: float
-    toned: bool
+    curve: str
     background: Floats | None
 
     def light(self, white: Floats, codes: Floats) -> Floats:
@@ -68,7 +69,8 @@ class Tone:
     def display(self, radiance: Floats) -> Floats:
         """(n, 3) colours, 0 to 255, of linear (n, 3) radiance."""
         exposed = radiance * self.exposure
-        return 255 * to_srgb(neutral(exposed) if self.toned else exposed)
+        curve = CURVES.get(self.curve)
+        return 255 * to_srgb(curve(exposed) if curve else exposed)
 
     def background_colors(self, ray: Floats) -> Floats:
         """(n, 3) colours of the background, 0 to 255, along (n, 3) rays of any length, Y up."""
@@ -88,12 +90,12 @@ def tone_of(index: Mapping[str, Any], cell: int = -1) -> Tone | None:
     if head is None:
         return None
     exposure, background = 1.0, None
-    if toned := head["tone"] == "neutral":
+    if head["tone"] in CURVES:
         if cell >= 0:
             exposure = float(index["cells"][cell].get("exposure", 1.0))
         if "sky" in head and "ground" in head:
             background = np.array([head["ground"], head["sky"]], np.float64)
-    return Tone(float(head["stops"]), exposure, toned, background)
+    return Tone(float(head["stops"]), exposure, head["tone"], background)
 
 
 def tone_at(served: Served, eye: Floats, cell: int | None = None) -> Tone | None:
@@ -116,6 +118,46 @@ def neutral(radiance: Floats) -> Floats:
     color = result[bright] * (compressed / peak)
     result[bright] = color + (compressed - color) * fading
     return result
+
+
+#: From Rec. 709 to the space of AgX, and from its curve to Rec. 2020 and back to Rec. 709.
+_TO_AGX = np.array(
+    [
+        [0.544815, 0.373787, 0.081384],
+        [0.140417, 0.754152, 0.105431],
+        [0.088811, 0.178876, 0.732313],
+    ]
+)
+_FROM_AGX = np.array(
+    [
+        [1.127101, -0.110607, -0.016494],
+        [-0.141330, 1.157824, -0.016494],
+        [-0.141330, -0.110607, 1.251936],
+    ]
+)
+_FROM_2020 = np.array(
+    [
+        [1.660491, -0.587641, -0.072850],
+        [-0.124550, 1.132900, -0.008349],
+        [-0.018151, -0.100579, 1.118730],
+    ]
+)
+#: Stops of the curve, from black to white, around 1.
+_DARKEST, _BRIGHTEST = -12.47393, 4.026069
+#: The contrast, a polynomial from the sixth power down.
+_CONTRAST = 15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232
+
+
+def agx(radiance: Floats) -> Floats:
+    """As `neutral`, by AgX."""
+    stops = np.log2(np.maximum(radiance @ _TO_AGX.T, 2.0**_DARKEST))
+    share = np.clip((stops - _DARKEST) / (_BRIGHTEST - _DARKEST), 0, 1)
+    shown = np.polyval(_CONTRAST, share) @ _FROM_AGX.T
+    return np.asarray(np.clip(np.maximum(shown, 0) ** 2.2 @ _FROM_2020.T, 0, 1))
+
+
+#: Tone curves by name.
+CURVES: Mapping[str, Callable[[Floats], Floats]] = {"neutral": neutral, "agx": agx}
 
 
 class LitSurfaces:
