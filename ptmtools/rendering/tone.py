@@ -177,7 +177,7 @@ class LitSurfaces:
         self.lightmaps: Triangles | None = None
         self.reflections: Reflections | None = None
         self.textures = [self.triangles.texture]
-        if surfaces.gloss and served.index.get("light", {}).get("tone") == "neutral":
+        if surfaces.gloss and served.index.get("light", {}).get("tone") in CURVES:
             self.reflections = Reflections(surfaces, self.triangles, served.index)
             self.textures.append(self.reflections.probe)
         if not (lit := self._white > 0).any():

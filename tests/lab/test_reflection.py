@@ -332,6 +332,13 @@ def test_nothing_reflects_without_baked_light(light: Any, monkeypatch: pytest.Mo
     np.testing.assert_array_equal(shown, expected)
 
 
+def test_each_tone_curve_shows_reflections(monkeypatch: pytest.MonkeyPatch) -> None:
+    served = glossy(FINISHES[0], light=dict(NEUTRAL, tone="agx"))
+    plain = replace(served, surfaces=replace(served.surfaces, gloss=None))
+    shown, without = (painted(each, monkeypatch) for each in (served, plain))
+    assert np.abs(shown - without).mean() > 5
+
+
 def test_a_probe_shows_a_smooth_sphere() -> None:
     """Over the edges of its maps as well, for any roughness."""
     random = np.random.default_rng(3)
