@@ -15,23 +15,46 @@ _EDGE_ON = 1e-300
 
 def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats, Floats]:
     """For some pixels, which show a triangle: (n, 2) texture coordinates, and (n, 2, 2) their
-    movement to the next pixel, u and v in the rows, across the screen and up it in the columns."""
-    triangle, ray = sight.triangle[pixel], sight.ray[pixel]
-    normal, gradient = triangles.normal[triangle], triangles.gradient[triangle]
-    facing, depth, at = _intersections(sight, pixel, triangles)
-    uv = triangles.uv[triangle, 0] + np.einsum("ikj,ij->ik", gradient, at)
-    slope = np.einsum("ij,kj->ik", normal, sight.axes) / facing[:, None]
-    move = sight.axes[None] - slope[:, :, None] * ray[:, None]
-    step = np.einsum("ikj,icj->ikc", gradient, move)
-    return uv, step * (np.abs(depth) * sight.pixel)[:, None, None]
+    movement to the next pixel, u and v in the rows, across the screen and up it in the columns.
+
+    Both are ratios of linear functions of the ray, whose coefficients are computed once for a
+    triangle: products of (n, 3, 3) arrays take six times as long.
+    """
+    shown = np.zeros(len(triangles.corner), np.bool_)
+    shown[sight.triangle[pixel]] = True
+    which = np.flatnonzero(shown)
+    place = np.empty(len(shown), np.int64)
+    place[which] = np.arange(len(which))
+    row, (x, y, z) = place[sight.triangle[pixel]], sight.ray[pixel].T
+    normal, gradient = triangles.normal[which], triangles.gradient[which]
+    offset = triangles.corner[which, 0] - sight.eye
+
+    def along(vectors: Floats) -> Floats:
+        """(n,) products of (t, 3) vectors of the triangles and the rays."""
+        a, b, c = (part.take(row) for part in vectors.T)
+        return np.asarray(a * x + b * y + c * z)
+
+    facing = along(normal)
+    facing[facing == 0] = _EDGE_ON
+    depth = np.einsum("ij,ij->i", normal, offset).take(row) / facing
+    slope = [part.take(row) / facing for part in (normal @ sight.axes.T).T]
+    uv, moves = np.empty((len(pixel), 2)), np.empty((len(pixel), 2, 2))
+    size = np.abs(depth) * sight.pixel
+    for k in range(2):
+        start = triangles.uv[which, 0, k] - np.einsum("ij,ij->i", gradient[:, k], offset)
+        growth, turns = along(gradient[:, k]), gradient[:, k] @ sight.axes.T
+        uv[:, k] = start.take(row) + growth * depth
+        for c in range(2):
+            moves[:, k, c] = (turns[:, c].take(row) - slope[c] * growth) * size
+    return uv, moves
 
 
 def detail_of_pixels(moves: Floats, width: int, height: int) -> Floats:
     """(n,) the level of detail λ, 0 for the finest level of ``width`` × ``height`` texels or finer:
     log2 of the texels by which the texture moves from a pixel to the next, in the direction in
     which it moves more, as in OpenGL; ``moves`` as `footprints` returns them."""
-    texels = np.linalg.norm(moves * np.array([width, height])[:, None], axis=1).max(axis=1)
-    return np.asarray(np.log2(np.maximum(texels, 1.0)))
+    square = (moves[:, 0] * width) ** 2 + (moves[:, 1] * height) ** 2
+    return np.asarray(np.log2(np.maximum(np.maximum(*square.T), 1.0)) / 2)
 
 
 def show_colors(

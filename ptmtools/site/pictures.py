@@ -2,11 +2,10 @@
 and one for each work in the catalogue.
 
 Rays find the surfaces of the pixels (`ptmtools.rendering.rays`) and the layers before them
-(`ptmtools.rendering.layers`), and textures are sampled at the level nearest to the size of a pixel,
-up to a number of texels a side: textures that no picture shows are not read, and only the first
-bytes of the others. (Tried: the compiled sampling of
-`ptmtools.rendering`, trilinear: the two look the same at this size, and where it is not compiled
-yet that takes four seconds.)
+(`ptmtools.rendering.layers`), and textures are sampled trilinearly, up to a number of texels a
+side: textures that no picture shows are not read, and only the first bytes of the others. (Tried:
+the compiled sampling of `ptmtools.rendering`: where it is not compiled yet that takes four
+seconds.)
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ from ptmtools.output.served import Served
 from ptmtools.parallel import map_in_order
 from ptmtools.rendering.footprints import detail_of_pixels, footprints
 from ptmtools.rendering.layers import Layer, Layers, blend, transparent_of
+from ptmtools.rendering.light import as_bytes
 from ptmtools.rendering.pyramids import in_colors, read_preview
 from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import Sight, Triangles
@@ -48,19 +48,20 @@ class PictureKind:
     finest: int = 256
 
 
-POSTER = PictureKind((640, 360), 12_000)
+POSTER = PictureKind((640, 360), 12_000, 512)
 SMALL = PictureKind((160, 90), 3_000)
 #: Of a work.
 WORK = PictureKind(PICTURE, 40_000, 512)
-#: Rays for a pixel, each way.
-_FINER = 1.5
+#: Rays for a pixel, each way, as `ptm render` casts.
+_SAMPLES = 2
 #: Viewpoints that have a picture at most.
 MOST = 32
 #: Rays in memory, 50 bytes each, and 12 for each layer that blends before a surface.
 _TOGETHER = 1 << 22
 _LIMITS = Limits(decoded_bytes=1 << 33)
 _THREADS = 4
-_QUALITIES = (80, 72, 64, 56, 48, 40, 32, 24, 16, 8)
+#: The least quality of a JPEG, and the first beyond the greatest.
+_QUALITIES = 8, 81
 
 #: The levels of a texture: (h, w, 3) each, or (h, w, 4) with alpha, coarsest first.
 Levels = Sequence[NDArray[np.uint8]]
@@ -171,25 +172,32 @@ class _Scene:
 
 
 def jpeg(colors: Floats, size: tuple[int, int], limit: int) -> bytes:
-    """A JPEG of the (n, 3) colours of rays, of at most ``limit`` bytes if the lowest quality allows
-    it."""
+    """A JPEG of the (n, 3) colours of rays, of the best quality with at most ``limit`` bytes, or of
+    the least."""
     from PIL import Image
 
-    width, height = _rays(size)
-    pixels = np.rint(np.clip(colors, 0, 255)).astype(np.uint8).reshape(height, width, 3)
-    image = Image.fromarray(pixels).resize(size, Image.Resampling.BOX)
-    data = b""
-    for quality in _QUALITIES:
+    means = colors.reshape(size[1], _SAMPLES, size[0], _SAMPLES, 3).mean(axis=(1, 3))
+    image = Image.fromarray(as_bytes(means))
+
+    def encode(quality: int) -> bytes:
         out = io.BytesIO()
         image.save(out, "JPEG", quality=quality, optimize=True, progressive=True)
-        data = out.getvalue()
-        if len(data) <= limit:
-            break
+        return out.getvalue()
+
+    best, beyond = _QUALITIES
+    data = encode(best)
+    while beyond - best > 1:
+        middle = (best + beyond) // 2
+        tried = encode(middle)
+        if len(tried) <= limit:
+            best, data = middle, tried
+        else:
+            beyond = middle
     return data
 
 
 def _rays(size: tuple[int, int]) -> tuple[int, int]:
-    return round(size[0] * _FINER), round(size[1] * _FINER)
+    return size[0] * _SAMPLES, size[1] * _SAMPLES
 
 
 def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -> Sight:
@@ -251,32 +259,47 @@ def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:
 
 
 def _sample_texels(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:
-    """(n, 3) colours that some pixels show of a texture, or (n, 4) with alpha."""
+    """(n, 3) colours that some pixels show of a texture, or (n, 4) with alpha: between those of the
+    two levels next to the size of a pixel."""
     uv, moves = footprints(sight, pixel, triangles)
     height, width = levels[-1].shape[:2]
     finest = len(levels) - 1
-    detail = np.rint(detail_of_pixels(moves, width, height))
-    coarser = np.clip(detail, 0, finest).astype(np.int64)
+    detail = np.minimum(detail_of_pixels(moves, width, height), finest)
+    step = detail.astype(np.int64)
+    share = detail - step
     clamped = triangles.clamped[sight.triangle[pixel]]
-    colors = np.empty((len(pixel), levels[0].shape[2]))
-    for step in np.unique(coarser):
-        rows = np.flatnonzero(coarser == step)
-        colors[rows] = _bilinear(levels[finest - step], uv[rows], clamped[rows])
+    colors = np.zeros((len(pixel), levels[0].shape[2]))
+    for number, level in enumerate(reversed(levels)):
+        for more, weight in (0, 1 - share), (1, share):
+            rows = np.flatnonzero((step + more == number) & (weight > 0))
+            if len(rows):
+                texels = _bilinear(level, uv[rows], clamped[rows])
+                colors[rows] += texels * weight[rows, None]
     return colors
 
 
 def _bilinear(level: NDArray[np.uint8], uv: Floats, clamped: NDArray[np.bool_]) -> Floats:
     """(n, c) of a level at (n, 2) texture coordinates."""
-    size = np.array([level.shape[1], level.shape[0]])
-    place = uv * size - 0.5
-    low = np.floor(place)
-    share = place - low
-    x, y = (
-        np.where(clamped, np.clip(low + k, 0, size - 1), np.mod(low + k, size)).astype(np.int64)
-        for k in (0, 1)
+    height, width, channels = level.shape
+    columns, rows = (
+        _adjacent_texels(uv[:, k], side, clamped[:, k]) for k, side in enumerate((width, height))
     )
-    across, down = share[:, :1], share[:, 1:]
-    upper = level[x[:, 1], x[:, 0]] * (1 - across) + level[x[:, 1], y[:, 0]] * across
-    lower = level[y[:, 1], x[:, 0]] * (1 - across) + level[y[:, 1], y[:, 0]] * across
-    color: Floats = upper * (1 - down) + lower * down
-    return color
+    texels = level.reshape(-1, channels)
+    across, down = columns[2][:, None], rows[2][:, None]
+    upper, lower = (
+        texels.take(row * width + columns[0], axis=0) * (1 - across)
+        + texels.take(row * width + columns[1], axis=0) * across
+        for row in rows[:2]
+    )
+    return np.asarray(upper * (1 - down) + lower * down)
+
+
+def _adjacent_texels(
+    at: Floats, side: int, clamped: NDArray[np.bool_]
+) -> tuple[Ints, Ints, Floats]:
+    """(n,) texels before and after coordinates in a row of ``side``, and shares of the latter."""
+    place = at * side - 0.5
+    low = np.floor(place)
+    first = np.where(clamped, np.clip(low, 0, side - 1), low % side).astype(np.int64)
+    after = np.where(clamped, np.clip(low + 1, 0, side - 1), (first + 1) % side).astype(np.int64)
+    return first, after, place - low

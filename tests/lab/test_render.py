@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.output.served import read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view, eye_of
+from ptmtools.site.pictures import PictureKind, jpeg, pictures_of
 
 SMALL = ["--width", "96", "--height", "54"]
 
@@ -49,6 +51,36 @@ def test_levels_and_light_change_the_picture(two_rooms: Path) -> None:
     assert np.abs(views[0] - views[1]).mean() > 1
     assert (views[2] <= views[0] + 1).all()
     assert (views[2] < views[0]).any()
+
+
+def test_pictures_of_sites_are_those_of_render(
+    two_rooms: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served, kind = read_served(two_rooms), PictureKind((160, 90), 9999, 512)
+    drawn: list[np.ndarray] = []
+
+    def keep(colors: np.ndarray, size: tuple[int, int], limit: int) -> bytes:
+        drawn.append(colors.reshape(size[1], 2, size[0], 2, 3).mean(axis=(1, 3)))
+        return b""
+
+    monkeypatch.setattr("ptmtools.site.pictures.jpeg", keep)
+    list(pictures_of(served, [(kind, served.index["viewpoints"][0])]))
+    expected = draw_view(served, ViewOptions(width=160, height=90)).astype(float)
+    assert 10 * np.log10(255**2 / ((drawn[0] - expected) ** 2).mean()) > 45
+
+
+@pytest.mark.parametrize("limit", [100, 3000, 6000, 10**9])
+def test_pictures_are_as_good_as_their_bytes_allow(limit: int) -> None:
+    colors = np.random.default_rng(1).normal(128, 40, (80 * 160, 3))
+    means = colors.reshape(40, 2, 80, 2, 3).mean(axis=(1, 3))
+    image = Image.fromarray(np.rint(np.clip(means, 0, 255)).astype(np.uint8))
+    sized = []
+    for quality in range(8, 81):
+        out = io.BytesIO()
+        image.save(out, "JPEG", quality=quality, optimize=True, progressive=True)
+        sized.append(out.getvalue())
+    best = max((data for data in sized if len(data) <= limit), key=len, default=sized[0])
+    assert jpeg(colors, (80, 40), limit) == best
 
 
 def test_where_the_eye_is(two_rooms: Path) -> None:
