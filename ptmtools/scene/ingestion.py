@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats
+from ptmtools.arrays import Bools, Floats, areas, sum_by_group
 from ptmtools.errors import InputError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.formats import ModelFormat, format_of
 from ptmtools.scene.images import ImageStore, OptionalImages
-from ptmtools.scene.lighting import add_maps, lights_of
+from ptmtools.scene.lighting import add_maps, lights_of, show_emission
 from ptmtools.scene.lights import Lights
 from ptmtools.scene.materials import SceneMaterials, gather_materials
 from ptmtools.scene.model import Camera, RoomVolume, Scene, Space, Storey
@@ -67,6 +67,7 @@ class Draft:
     source: ModelSource = field(init=False)
     kept: KeptFaces = field(init=False)
     space: Space = field(init=False)
+    images: OptionalImages = field(init=False)
     surfaces: SceneMaterials = field(init=False)
     points: Floats = field(init=False)
     triangles: NDArray[np.int32] = field(init=False)
@@ -206,6 +207,8 @@ def find_space(draft: Draft) -> None:
 
 def find_materials(draft: Draft) -> None:
     """Keeps the materials and images that faces use. Raises as `gather_materials`."""
+    draft.images = OptionalImages(draft.store, draft.notes)
+    draft.source = show_emission(draft.source, draft.kept, draft.images)
     draft.surfaces = gather_materials(
         draft.source,
         draft.kept,
@@ -227,11 +230,12 @@ def place_faces(draft: Draft) -> None:
 def find_lights(draft: Draft) -> None:
     """Gathers the lights. Raises as the reader of the format."""
     used, second = draft.surfaces.used, draft.format.second
-    images = OptionalImages(draft.store, draft.notes)
-    draft.lights = lights_of(draft.source, used, draft.space, images)
+    area = areas(draft.points[draft.triangles])
+    shares = sum_by_group(draft.surfaces.triangle_material, area / area.sum(), len(used))
+    draft.lights = lights_of(draft.source, used, draft.space, draft.images, shares)
     read = second.load()(draft.model, draft.options, "lightmap") if second else None
     if read is not None:
-        draft.lights = add_maps(draft.lights, read, draft.kept, used, images)
+        draft.lights = add_maps(draft.lights, read, draft.kept, used, draft.images)
 
 
 def check_facing(draft: Draft) -> None:

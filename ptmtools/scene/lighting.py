@@ -1,5 +1,8 @@
 """Gathers the lights of a model: lamps, the emission of its materials, and its lightmaps.
 
+A dark surface without an image of its own shows that of its emission; of any other, the emission
+is reduced to its mean.
+
 An occlusion texture of glTF is a lightmap if its surfaces lie in it once. One that repeats belongs
 to its material, like a normal map. What cannot be read is left out with a note, and is no miss,
 because most builds do not need it.
@@ -11,14 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ptmtools.arrays import Ints, plane_areas
-from ptmtools.scene.colors import to_linear
+from ptmtools.arrays import Floats, Ints, plane_areas
+from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.scene.faces import KeptFaces
 from ptmtools.scene.images import OptionalImages, integers
 from ptmtools.scene.lights import MOST, Lamp, Lights, ModelMap, Radiance
 from ptmtools.scene.model import Space
 from ptmtools.scene.orientation.space import rotate, to_world
-from ptmtools.scene.source import ModelSource, SecondReading, SourceMaterial
+from ptmtools.scene.source import DARK, ModelSource, SecondReading, SourceMaterial
 from ptmtools.texture.model import Limits
 
 #: Coordinates may be this far outside of an image that lies on its surfaces once.
@@ -29,17 +32,38 @@ _FAR = 1e6
 _STRIP_TEXELS = 1 << 20
 
 
+def show_emission(source: ModelSource, kept: KeptFaces, images: OptionalImages) -> ModelSource:
+    """The model, in which dark materials without an image have that of their emission as texture:
+    they are unlit, and only the mean of the image lights others."""
+    materials, number = list(source.materials), source.triangle_material[kept.source]
+    for place in np.unique(number).tolist():
+        material = materials[place]
+        dark = material.color is not None and max(material.color) <= DARK
+        if not (dark and material.glow_map and any(material.glow)) or material.texture is not None:
+            continue
+        uv = source.uv[kept.source[number == place]].reshape(-1, 2)
+        shown = np.isfinite(uv).all() and np.ptp(uv, axis=0).any()
+        if shown and material.opacity == 1 and images.read(material.glow_map, _mean) is not None:
+            red, green, blue = to_srgb(np.array(material.glow)).tolist()
+            materials[place] = replace(
+                material,
+                color=(red, green, blue),
+                texture=material.glow_map,
+                ignores_alpha=True,
+                unlit=True,
+            )
+    return replace(source, materials=tuple(materials))
+
+
 def lights_of(
-    source: ModelSource,
-    used: Ints,
-    space: Space,
-    images: OptionalImages,
+    source: ModelSource, used: Ints, space: Space, images: OptionalImages, shares: Floats
 ) -> Lights:
     """The lights of a model without its lightmaps. ``used``: (M,) the materials of the scene by
-    their numbers in the source."""
+    their numbers in the source; ``shares``: (M,) of the area of all surfaces."""
     materials = [source.materials[number] for number in used.tolist()]
+    glow = [_glow(m, images, share) for m, share in zip(materials, shares.tolist(), strict=True)]
     return Lights(
-        np.array([_glow(material, images) for material in materials], np.float32).reshape(-1, 3),
+        np.array(glow, np.float32).reshape(-1, 3),
         np.array([material.unlit for material in materials], np.bool_),
         tuple(_place(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
@@ -48,8 +72,8 @@ def lights_of(
     )
 
 
-def _glow(material: SourceMaterial, images: OptionalImages) -> Radiance:
-    """The linear radiance that a material emits, on average."""
+def _glow(material: SourceMaterial, images: OptionalImages, share: float) -> Radiance:
+    """The linear radiance that a material emits, on average; ``share``: of all surfaces."""
     red, green, blue = (min(max(0.0, part), MOST) for part in material.glow)
     glow = red, green, blue
     if glow != material.glow:
@@ -58,7 +82,12 @@ def _glow(material: SourceMaterial, images: OptionalImages) -> Radiance:
         images.notes.note("PTM-N215", text)
     if not any(glow) or material.glow_map is None:
         return glow
-    mean = images.read(material.glow_map, _mean)
+    image = material.glow_map
+    mean = images.read(image, _mean)
+    known = material.texture is not None and material.texture.read == image.read
+    if mean is not None and not known:
+        text = f"{material.name}: image of emission reduced to its mean, on {share:.2g} of all area"
+        images.notes.note("PTM-N215", text, image.place)
     return glow if mean is None else (red * mean[0], green * mean[1], blue * mean[2])
 
 

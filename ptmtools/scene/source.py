@@ -108,6 +108,10 @@ class NormalTexture:
     own: bool = False
 
 
+#: A material whose colour, sRGB, has no greater part than this shows nothing but its emission.
+DARK = 0.15
+
+
 @dataclass(frozen=True)
 class SourceMaterial:
     """A material of the model.

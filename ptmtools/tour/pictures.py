@@ -250,13 +250,13 @@ def works_of(scene: Scene) -> Bools:
             canvas = faces[material == number]
             if shown[scene.materials[number].image] <= _COPIES and all(
                 images_once(scene, part, _WHOLE) and finder.work_of(part, faces)
-                for part in _connected(scene, canvas)
+                for part in _components(scene, canvas)
             ):
                 result[canvas] = True
     return result
 
 
-def _connected(scene: Scene, faces: Ints) -> Iterator[Ints]:
+def _components(scene: Scene, faces: Ints) -> Iterator[Ints]:
     """The parts of (n,) faces that share no places."""
     corner = scene.points[scene.triangles[faces]].reshape(-1, 3)
     _, place = np.unique(corner, axis=0, return_inverse=True)

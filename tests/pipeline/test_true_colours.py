@@ -1,4 +1,5 @@
-"""Works of art are shown in the colours of their files, whatever light their room has."""
+"""Works of art, and images of emission, are shown in the colours of their files, whatever light
+their room has."""
 
 from __future__ import annotations
 
@@ -53,7 +54,8 @@ def upright(x: float, z: float) -> Floats:
 
 
 def write_red_gallery(folder: Path) -> Path:
-    """A white room with a red lamp and a painting, whose image the far wall has, too."""
+    """A white room with a red lamp, a painting, whose image the far wall has, too, and a screen
+    that emits it."""
     doc = GltfModel()
     image = doc.view(png(np.kron(QUARTERS, np.ones((32, 32, 1), np.uint8))))
     doc.tree["images"] = [{"bufferView": image, "mimeType": "image/png"}]
@@ -62,9 +64,16 @@ def write_red_gallery(folder: Path) -> Path:
     doc.tree["materials"] = [
         {"name": "white", "doubleSided": True, "pbrMetallicRoughness": rough},
         {"name": "painting", "pbrMetallicRoughness": rough | {"baseColorTexture": {"index": 0}}},
+        {
+            "name": "screen",
+            "pbrMetallicRoughness": rough | {"baseColorFactor": [0, 0, 0, 1]},
+            "emissiveTexture": {"index": 0},
+            "emissiveFactor": [1, 1, 1],
+        },
     ]
     add_white_room(doc, 0)
-    add_rectangle(doc, "painting", upright(2, 0.02), 1)
+    add_rectangle(doc, "painting", upright(0.5, 0.02), 1)
+    add_rectangle(doc, "screen", upright(3.5, 0.02), 2)
     far = np.array([[SIDE, 0, 5.98], [0, 0, 5.98], [0, HEIGHT, 5.98], [SIDE, HEIGHT, 5.98]])
     add_rectangle(doc, "wallpaper", far, 1)
     light = {"type": "point", "color": [1, 0.05, 0.05], "intensity": 200}
@@ -105,13 +114,15 @@ def lit_materials(db: Path) -> dict[str, set[bool]]:
 def test_a_painting_in_red_light(tmp_path: Path) -> None:
     model = write_red_gallery(tmp_path / "model")
     db = build(model, tmp_path / "db")
-    eye, point = np.array([0, 1.5, 1.0]), np.array([0, 1.5, -2.98])
+    eye, point = np.array([-1.5, 1.5, 1.0]), np.array([-1.5, 1.5, -2.98])
+    aside = np.array([3.0, 0, 0])
     lit = lit_materials(db)
-    assert lit.pop("painting") == {False}
+    assert lit.pop("painting") == lit.pop("screen") == {False}
     assert set().union(*lit.values()) == {True}, "so is wallpaper of the same image"
-    shown = quarters(db, eye, point)
-    assert np.abs(shown - QUARTERS).max() <= 1
+    for way in (0 * aside, aside):
+        assert np.abs(quarters(db, eye + way, point + way) - QUARTERS).max() <= 1
     build(model, db, true_colours="none")
-    assert set().union(*lit_materials(db).values()) == {True}
+    assert [name for name, has in lit_materials(db).items() if has != {True}] == ["screen"]
+    assert np.abs(quarters(db, eye + aside, point + aside) - QUARTERS).max() <= 1
     shown = quarters(db, eye, point)
-    assert (np.abs(shown - QUARTERS).max(axis=2) > 30).all(), "red light"
+    assert (np.abs(shown - QUARTERS).max(axis=2) > 20).all(), "red light"

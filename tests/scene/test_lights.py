@@ -278,6 +278,48 @@ def test_emission_of_obj(textured: Callable[..., Path]) -> None:
         assert ("glow.png" in scene.files) == ("glow.png" in mtl)
 
 
+BLACK = {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0}
+ALL = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}
+
+
+def reduced(scene: Scene) -> list[str]:
+    return [note.message for note in scene.notes if "reduced to its mean" in note.message]
+
+
+def test_dark_surfaces_show_the_image_of_their_emission(put: Put) -> None:
+    turned = {"index": 0, "texCoord": 1}
+    uv = np.array([[0, 0], [0.5, 0], [0.5, 0.5], [0, 0.5]])
+    half = {"emissiveFactor": [0.5, 1, 1], "emissiveTexture": turned}
+    scene = emitting(put, uv=uv, pbrMetallicRoughness=BLACK, **half)
+    (material,) = scene.materials
+    assert material.image == 0
+    assert material.color == pytest.approx((0.735, 1, 1), abs=1e-3), "0.5 in sRGB"
+    assert scene.uv.max(axis=(0, 1)).tolist() == [0.5, 1], "those of the emission"
+    assert lights(scene).unlit.all()
+    assert lights(scene).glow == pytest.approx(np.array([[0.25, 0.5, 0.5]]))
+    assert reduced(scene) == []
+
+
+def test_other_images_of_emission_are_reduced_to_their_mean(put: Put) -> None:
+    (message,) = reduced(emitting(put, name="screen", **ALL))
+    assert message == "screen: image of emission reduced to its mean, on 1 of all area"
+    base = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    scene = emitting(put, pbrMetallicRoughness=base, **ALL)
+    assert reduced(scene) == [], "the texture shows it"
+    scene = emitting(put, image=b"none", pbrMetallicRoughness=BLACK, **ALL)
+    assert scene.materials[0].image == -1
+    assert not lights(scene).unlit.any()
+
+
+def test_dark_materials_of_obj_show_their_emission(textured: Callable[..., Path]) -> None:
+    files = {"glow.png": png(HALF)}
+    options = IngestOptions(unit="m", up="y")
+    for mtl, image in (("Kd 0 0 0\nmap_Ke glow.png", 0), ("Kd 1 1 1\nmap_Ke glow.png", -1)):
+        scene = ingest(textured(mtl, files), options)
+        assert [m.image for m in scene.materials] == [image]
+        assert len(reduced(scene)) == -image
+
+
 def test_a_texture_that_also_glows_is_not_plain(textured: Callable[..., Path]) -> None:
     """The model is read again when it is repainted."""
     white = {"glow.png": png(np.full((4, 4, 3), 255, np.uint8))}

@@ -146,7 +146,11 @@ def _reflectance(artifacts: Artifacts) -> NDArray[np.float64]:
         curve = 2.4 * 1.4 / 1.055**2 * ((mean + 0.055) / 1.055) ** 0.4
         means.append(np.clip(to_linear(mean) + curve * spread / 2, 0, 1))
     mean = np.array([means[m.image] if m.image >= 0 else np.ones(3) for m in scene.materials])
-    return np.asarray(_tint(scene) * mean.reshape(-1, 3)[scene.triangle_material])
+    mean = mean.reshape(-1, 3)
+    if (lights := lights_of(artifacts)) is not None:
+        # They show their emission, and are dark themselves.
+        mean[lights.unlit & lights.glow.any(axis=1)] = 0
+    return np.asarray(_tint(scene) * mean[scene.triangle_material])
 
 
 def _tint(scene: Scene) -> NDArray[np.float64]:

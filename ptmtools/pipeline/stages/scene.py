@@ -223,7 +223,7 @@ class SceneStage(Stage["Scene"]):
     name = "scene"
     about = "Read a model."
     recipe = 14
-    changed = "lamps of IFC files have their power"
+    changed = "lamps of IFC files have their power, and images of emission are shown"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

@@ -23,6 +23,7 @@ from ptmtools.scene.gltf.compression import TranscodedBytes
 from ptmtools.scene.gltf.document import FAULTS, GltfDocument, data_uri, fault_of
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import (
+    DARK,
     FileRange,
     HeldBytes,
     NormalTexture,
@@ -132,6 +133,11 @@ class GltfMaterialReader:
             placed = self._optional("PTM-N204", what, place, self._other, entry) or placed
         elif use is not None:
             placed = self._place(use, place)
+        elif max(red, green, blue) <= DARK and "emissiveTexture" in entry:
+            # The image of its emission may become its texture.
+            what = f"{name}: coordinates of emission"
+            known = self._optional("PTM-N215", what, place, self._emission_placement, entry)
+            placed = (None, *known) if known else placed
         texture, coords, matrix, moved = placed
         if moved:
             message = f"{name}: KHR_texture_transform baked into its faces"
@@ -184,6 +190,11 @@ class GltfMaterialReader:
         """A texture that a material names."""
         texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
         return texture, *_placement(use)
+
+    def _emission_placement(
+        self, entry: dict[str, Any], place: str
+    ) -> tuple[str, NDArray[np.float64], bool]:
+        return _placement(entry["emissiveTexture"])
 
     def _other(self, entry: dict[str, Any], place: str) -> _Placed | None:
         """The texture in place of that of the base colour."""
