@@ -362,6 +362,9 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
     existing = _existing(columns)
     differences_[existing] = np.maximum(differences_[existing], LEAST_DIFFERENCE)
+    for t, row in enumerate(textures):
+        if "probe" in row:  # coarser levels are of no use
+            differences_[t, : columns.levels[t]] = 0
     return Catalogue(
         **columns._asdict(),
         differences=differences_,
@@ -389,13 +392,16 @@ def _existing(columns: Columns) -> Bools:
 
 
 def _shapes(surfaces: Surfaces) -> Shapes:
-    """The shapes, and once more those with a lightmap, as if that was their texture."""
-    shapes, light = _textured_shapes(surfaces), surfaces.light
-    if light is None:
-        return shapes
-    lit = vars(_textured_shapes(light))
-    kept = lit["texture"] >= 0
-    return shapes.join(Shapes(**{name: rows[kept] for name, rows in lit.items()}))
+    """The shapes, and once more those with a lightmap, and those with a probe, as if that was their
+    texture."""
+    shapes, gloss = _textured_shapes(surfaces), surfaces.gloss
+    mirrors = replace(surfaces, texture=gloss.probe) if gloss else None
+    for maps in (surfaces.light, mirrors):
+        if maps is not None:
+            mapped = vars(_textured_shapes(maps))
+            kept = mapped["texture"] >= 0
+            shapes = shapes.join(Shapes(**{name: rows[kept] for name, rows in mapped.items()}))
+    return shapes
 
 
 def _textured_shapes(surfaces: Surfaces) -> Shapes:

@@ -45,7 +45,7 @@ class WalkViews:
     start: (F + 1,) first row of each frame.
     cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Octrees come
         after the textures, see `ptmtools_lab.relief`. A surface with a lightmap is in two rows, and
-        one whose material has a normal map in another.
+        one whose material has a normal map in another, and one that reflects in that of its probe.
     error, square: (R, S + 1) part of the frame's mean error, and mean squared error, with these as
         the finest data: nothing, the mean colour, then the states from 1 on (`Lossy`), which begin
         with level 0, level 1, …; in other forms their columns in place of states.
@@ -134,6 +134,7 @@ def look(
         for maps, weight in ((surfaces.light, 1.0), (surfaces.bump_surfaces, NORMALS))
         if maps is not None
     ]
+    mirrors = [_ProbeTally(surfaces, textures, seen) for textures in shown if surfaces.gloss]
     relief_tally = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
@@ -145,6 +146,8 @@ def look(
             tally.add(plain)
         for tally in (tally for _, maps in others for tally in maps):
             tally.add(sight)
+        for mirror in mirrors:
+            mirror.add(sight)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
     more = [relief_tally.rows()] if relief_tally else []
@@ -152,6 +155,8 @@ def look(
     for weight, maps in others:
         for rows, tally in zip(parts, maps, strict=True):
             rows.append(_of_maps(tally.rows(), weight))
+    for rows, mirror in zip(parts, mirrors, strict=False):
+        rows.append(mirror.rows())
     return [_views(rows, owner, depth) for rows in parts]
 
 
@@ -196,6 +201,28 @@ class _Tally:
         """Adds the rows of the next frame."""
         self._add(sight, *self._what, self._sums.sums, self._room)
         self._sums.end_frame(self._sums.sums.need[:, 0] != 0)
+
+
+class _ProbeTally:
+    """Sums up the pixels of surfaces that reflect. They want the finest level of their probe; what
+    they show without it is no error of the tables, which know texels alone."""
+
+    def __init__(self, surfaces: Surfaces, textures: Pyramids | Shows, seen: Bools) -> None:
+        assert surfaces.gloss is not None
+        probe = surfaces.gloss.probe
+        columns = textures.last if isinstance(textures, Shows) else textures.levels
+        self._sums = RowSums(np.stack([surfaces.cell, probe], axis=1), int(columns.max()), 0, seen)
+        self._probe, self._seen, self._finest = probe, seen, columns[probe] - 1
+        self.rows = self._sums.rows
+
+    def add(self, sight: Sight) -> None:
+        """Adds the rows of the next frame."""
+        sums = self._sums.sums
+        mirrors = (sight.triangle >= 0) & (self._probe[sight.triangle] >= 0)
+        for table, pixels in (sums.need, mirrors), (sums.sight, mirrors & self._seen):
+            triangle = sight.triangle[pixels]
+            np.add.at(table, (sums.pair[triangle], self._finest[triangle]), 1.0)
+        self._sums.end_frame(np.asarray(sums.need.any(axis=1)))
 
 
 def _item_buffer(

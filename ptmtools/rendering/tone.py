@@ -177,11 +177,11 @@ class LitSurfaces:
         self.lightmaps: Triangles | None = None
         self.reflections: Reflections | None = None
         self.textures = [self.triangles.texture]
-        if surfaces.gloss and served.index.get("light", {}).get("tone") in CURVES:
-            self.reflections = Reflections(surfaces, self.triangles, served.index)
-            self.textures.append(self.reflections.probe)
         if not (lit := self._white > 0).any():
             return
+        if surfaces.gloss and served.index["light"]["tone"] in CURVES:
+            self.reflections = Reflections(surfaces, self.triangles, served.index)
+            self.textures.append(self.reflections.probe)
         if light := surfaces.light:
             self.lightmaps = triangles_of(light)
             self.textures.append(self.lightmaps.texture)
@@ -280,7 +280,7 @@ def show_vertex_light(served: Served) -> Served:
         light = white[at_vertices, None, None] * to_linear(colors[at_vertices])
         colors[at_vertices] = tone.display(light.reshape(-1, 3)).reshape(light.shape) / 255
         color[at_vertices] = _factors(surfaces)[at_vertices] * colors[at_vertices].mean(axis=1)
-    unlit = replace(surfaces, white=None, gloss=None, color=color, vertex_colors=colors)
+    unlit = replace(surfaces, white=None, color=color, vertex_colors=colors)
     return replace(served, surfaces=unlit)
 
 

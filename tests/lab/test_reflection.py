@@ -32,8 +32,10 @@ from ptmtools.rendering.records import Sight
 from ptmtools.rendering.reflection import DIELECTRIC, Panorama, lit_radiance, mix_light, octahedral
 from ptmtools.rendering.tone import show_vertex_light, tone_of
 from ptmtools.site.pictures import _Scene
+from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.lossy import no_previews
 from ptmtools_lab.renderer import FrameRenderer
+from ptmtools_lab.tables import look
 from tests.lab.test_tone import (
     AHEAD,
     CAMERA,
@@ -319,6 +321,27 @@ def test_frames_of_the_simulator_reflect(monkeypatch: pytest.MonkeyPatch) -> Non
     frame = renderer.colors(sight, np.ones(1, np.bool_), np.array([1, 2, 0])).reshape(-1, 3)
     expected = expected_colors(sight, FINISHES[0], None)
     np.testing.assert_allclose(frame[strip], expected[strip], atol=0.01)
+
+
+def test_clients_want_the_finest_level_of_a_probe_in_sight() -> None:
+    """Coarser ones are of no use. The error of the tables knows texels alone."""
+    served = glossy(FINISHES[0])
+    pyramids = pack_pyramids([*levels(), [IMAGE[::2, ::2], IMAGE]])
+    eye, ahead = np.zeros((1, 3)), AHEAD[None]
+    (views,) = look(served.surfaces, pyramids, CAMERA, eye, ahead)
+    triangle = Caster(served.surfaces).look(CAMERA, eye[0], ahead[0]).triangle
+    mirrors, rows = (triangle >= 0) & (triangle < 4), views.texture == 2
+    np.testing.assert_allclose(views.need[rows], [[0, mirrors.mean()]])
+    np.testing.assert_allclose(views.sight[rows], [[0, mirrors[CAMERA.sparse].mean()]])
+    assert (views.error[rows] == 0).all()
+    served.index["cells"][0]["box"] = [[-9, -9, -9], [9, 9, 9]]
+    for row in served.index["textures"]:
+        row.update(texelBytes=3, gpuTexelBytes=4, differences=[0], color=[0, 0, 0])
+    served.index["textures"][2].update(ends=[1, 2], differences=[0, 7])
+    served = replace(served, statistics={"cells": [{}]})
+    stock = catalogue_of(served, np.zeros((3, 2)), np.zeros((3, 3)))
+    assert stock.differences[2].tolist() == [0, 0, 7]
+    assert stock.shapes.texture.tolist().count(2) == 3
 
 
 @pytest.mark.parametrize("light", [NEUTRAL, PLAIN, None])
