@@ -73,7 +73,7 @@ class Light:
     vertex: (M, 3, 3) uint8 shares of white at the corners, encoded as sRGB; 255 where it is not at
         vertices.
     horizon: (2, 3) radiance of the sky and of the ground.
-    shine: (M, 3) the linear colours, of 1 at most, that materials have that are lamps; 0 of others.
+    shine: (M, 3) radiance that materials send that are lamps; 0 of others.
     reflects: (S,) whether a shape shows the probe of its cell.
     probe: (C, 11) of each cell white and mean, centre and the corners of the box, see `Probe`; 0
         without one.

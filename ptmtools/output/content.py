@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.output.emitter import Emitter
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions
-from ptmtools.output.numbers import shares_of
+from ptmtools.output.numbers import shares_of, significant
 from ptmtools.output.representation import Represented, object_maps, replaced_objects
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import to_linear, to_srgb
@@ -115,15 +115,27 @@ class Content:
         return lit.with_normals(self.scene, self.cells) if light else lit
 
     @cached_property
-    def shown_materials(self) -> tuple[Material, ...]:
-        """The materials of the scene; in a building with light, lamps without an image shine."""
+    def lamp_whites(self) -> dict[int, float]:
+        """The materials of lamps without an image, and the greatest component of their radiance, at
+        the usual exposure; in a building with light."""
         light, materials = self.extras.light, self.scene.materials
         if light is None:
-            return materials
-        return tuple(
-            replace(m, color=_brighter(m.color, s)) if m.image < 0 and s.any() else m
-            for m, s in zip(materials, light.shine, strict=True)
-        )
+            return {}
+        lamps = [k for k, m in enumerate(materials) if m.image < 0 and m.opacity == 1]
+        lamps = [k for k in lamps if light.shine[k].any()]
+        whites = significant(np.array([_shown(materials[k], light.shine[k]).max() for k in lamps]))
+        return {k: white or 1.0 for k, white in zip(lamps, whites, strict=True)}
+
+    @cached_property
+    def shown_materials(self) -> tuple[Material, ...]:
+        """The materials of the scene; those of `lamp_whites` have the colours of their light."""
+        materials, light = list(self.scene.materials), self.extras.light
+        for k, white in self.lamp_whites.items():
+            assert light
+            shares = np.minimum(_shown(materials[k], light.shine[k]) / white, 1)
+            red, green, blue = to_srgb(shares).tolist()
+            materials[k] = replace(materials[k], color=(red, green, blue))
+        return tuple(materials)
 
     @cached_property
     def position_exponent(self) -> int:
@@ -189,5 +201,6 @@ class Content:
         return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]
 
 
-def _brighter(color: tuple[float, float, float], shine: NDArray[np.float64]) -> Any:
-    return tuple(to_srgb(np.maximum(to_linear(np.array(color)), shine)).tolist())
+def _shown(material: Material, shine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) the radiance of a lamp: that which it sends, but no less than its colour."""
+    return np.maximum(to_linear(np.array(material.color)), shine)

@@ -25,6 +25,7 @@ import json
 from collections.abc import Container, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
@@ -106,13 +107,15 @@ class MaterialWriter:
         white: float | None,
         reliefs: Mapping[int, tuple[int, TextureRecord]],
         probe: int | None = None,
+        lamps: Mapping[int, float] = MappingProxyType({}),
     ) -> None:
         """``textures``: for every image its index in the hints' list, and its record; ``lightmap``
         and ``reliefs``: the same for the lightmap of the cell, and for the normal maps of
-        objects; ``white``: see `Light`; ``probe``: the index of that of the cell."""
+        objects; ``white``: see `Light`; ``probe``: the index of that of the cell; ``lamps``: the
+        `white` of materials that are lamps."""
         self._scene = materials
         self._records = textures
-        self._lightmap, self._white, self._probe = lightmap, white, probe
+        self._lightmap, self._white, self._probe, self._lamps = lightmap, white, probe, lamps
         self._reliefs = reliefs
         self._fallback = fallback
         self._known: dict[tuple[Any, ...], int] = {}
@@ -141,8 +144,9 @@ class MaterialWriter:
         place = self._known.setdefault(key, len(self._materials))
         if place == len(self._materials):
             row = self._material(self._scene[material], two_sided, mesh)
-            if lit:
-                row["extras"] = row.get("extras", {}) | {"white": self._white}
+            if lit or material in self._lamps:
+                white = self._white if lit else self._lamps[material]
+                row["extras"] = row.get("extras", {}) | {"white": white}
             if reflects:
                 row["extras"] = row.get("extras", {}) | {"probe": self._probe}
                 if not lit:
@@ -331,6 +335,7 @@ def _glb(content: Content, cell: int, name: str, shapes: Iterable[_Drawn]) -> by
         white,
         places.of_object,
         places.probe[cell][0] if cell in places.probe else None,
+        content.lamp_whites,
     )
     represented = content.extras.represented
     replaced, extras = replaced_objects(represented), node_extras(represented)

@@ -294,7 +294,6 @@ def _light_of(
         daylight = building.field.daylight
         horizon = factor * np.array([daylight.sky, daylight.ground])
         shine = factor * building.shine
-        shine /= np.maximum(shine.max(axis=1, keepdims=True), 1)
         first = geometry.piece[geometry.triangle_start[:-1]]
         reflects = reflective_shapes(scene, geometry, unlit[run[CELLS].triangle_source[first]])
         of_cells = np.split(reflects, geometry.cell_start[1:-1])
