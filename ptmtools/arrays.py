@@ -33,6 +33,12 @@ def normals(corners: Floats) -> Floats:
     return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def units(vectors: Floats) -> Floats:
+    """(..., 3) vectors of length 1, or 0 where that is 0."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
+
+
 def polygon_planes(
     start_point: Floats, following: Floats, start: Ints, thinnest: float
 ) -> tuple[Floats, Bools]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, areas, normals, sum_by_group
+from ptmtools.arrays import Floats, areas, normals, sum_by_group, units
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import single
@@ -281,8 +281,8 @@ def smooth_normals(corner: NDArray[np.floating], group: NDArray[np.integer]) -> 
     normal within the crease angle; 0 of what has no area."""
     _, place = _weld(corner.reshape(-1, 3).astype(np.float32))
     points = corner.astype(np.float64)
-    face = _unit(normals(points))
-    ahead = _unit(np.roll(points, -1, axis=1) - points)
+    face = units(normals(points))
+    ahead = units(np.roll(points, -1, axis=1) - points)
     cosine = -np.einsum("tcx,tcx->tc", ahead, np.roll(ahead, 1, axis=1))
     weight = (np.arccos(np.clip(cosine, -1, 1)) * areas(points)[:, None]).ravel()
     # Equal directions at one corner of a group become one; they follow each other in their order.
@@ -294,7 +294,7 @@ def smooth_normals(corner: NDArray[np.floating], group: NDArray[np.integer]) -> 
     row = row.ravel()
     weighted = weight[:, None] * np.repeat(face, 3, axis=0)
     part = np.stack([sum_by_group(row, weighted[:, axis], len(keys)) for axis in range(3)], axis=1)
-    mean, total, at = _unit(part), part.copy(), keys // side**3
+    mean, total, at = units(part), part.copy(), keys // side**3
     first, step = np.arange(len(keys) - 1), 1
     while len(first := first[at[first] == at[first + step]]):
         near = np.einsum("nx,nx->n", mean[first], mean[first + step]) > _CREASE
@@ -303,28 +303,20 @@ def smooth_normals(corner: NDArray[np.floating], group: NDArray[np.integer]) -> 
         total[b] += part[a]
         step += 1
         first = first[first < len(keys) - step]
-    return _unit(total)[row].reshape(-1, 3, 3)
+    return units(total)[row].reshape(-1, 3, 3)
 
 
 def bends(corner: Floats, normal: Floats) -> NDArray[np.bool_]:
     """(T,) whether the (T, 3, 3) normals of the corners of triangles are others than their own."""
-    apart = np.abs(normal - _unit(normals(corner))[:, None]).max(axis=(1, 2))
+    apart = np.abs(normal - units(normals(corner))[:, None]).max(axis=(1, 2))
     return np.asarray(NORMAL_STEPS * apart > 0.5)
 
 
 def normal_steps(normal: Floats) -> NDArray[np.int8]:
     """Vectors (..., 3) as unit vectors in `NORMAL_STEPS`; those of no length point up."""
-    unit = _unit(normal)
+    unit = units(normal)
     unit[~unit.any(axis=-1)] = [0.0, 1.0, 0.0]
     return np.asarray(np.rint(NORMAL_STEPS * unit), np.int8)
-
-
-def _unit(vector: Floats) -> Floats:
-    """(..., 3) of length 1, or 0 where that is 0."""
-    length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    unit = np.zeros_like(vector)
-    np.divide(vector, length, out=unit, where=length > 0)
-    return unit
 
 
 def _index_rows(

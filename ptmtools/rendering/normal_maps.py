@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, units
 from ptmtools.output.object_maps import frame_axes
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.kernels import shade
@@ -70,11 +70,11 @@ def show_bumps(
     face, ray = sight.triangle[bumped], sight.ray[bumped]
     normal = triangles.normal[face]
     facing = np.einsum("ij,ij->i", normal, ray)
-    up = _unit(np.where(facing[:, None] > 0, -normal, normal))
+    up = units(np.where(facing[:, None] > 0, -normal, normal))
     # The tangent is the direction along which v stays: across its gradient, to where u grows.
     du, dv = np.moveaxis(triangles.gradient[face], 1, 0)
     right = np.cross(dv, up)
-    right = _unit(np.where(np.einsum("ij,ij->i", right, du)[:, None] < 0, -right, right))
+    right = units(np.where(np.einsum("ij,ij->i", right, du)[:, None] < 0, -right, right))
     over = np.cross(up, right)
     # v grows downwards in the image.
     over = np.where(np.einsum("ij,ij->i", over, dv)[:, None] > 0, -over, over)
@@ -101,9 +101,3 @@ def _sample_maps(sight: Sight, maps: Surfaces, shows: Shows, loaded: Bools, colu
     value = np.empty((len(sight.ray), 3))
     shade(sight, triangles_of(maps), shows, loaded, column, value)
     return value
-
-
-def _unit(rows: Floats) -> Floats:
-    """(n, 3) of length 1, or 0."""
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Floats, Ints, units
 from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.footprints import corner_values, surface_points
@@ -222,12 +222,12 @@ class Reflections:
     def _facings(self, sight: Sight, pixel: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         """(n, 3) points that some pixels show, unit vectors to the eye, unit normals of any side,
         and (n,) cosines between the eye and those that are turned to it."""
-        triangle, view = sight.triangle[pixel], _unit(-sight.ray[pixel])
+        triangle, view = sight.triangle[pixel], units(-sight.ray[pixel])
         normal = self._triangles.normal[triangle]
         if self._normals is not None:
             curved = np.flatnonzero(self._curved[triangle])
             normal[curved] = corner_values(sight, pixel[curved], self._triangles, self._normals)
-        normal = _unit(normal)
+        normal = units(normal)
         facing = np.einsum("ij,ij->i", normal, view)
         at = surface_points(sight, pixel, self._triangles)
         return at, view, normal, np.maximum(np.abs(facing), _GRAZING)
@@ -244,9 +244,3 @@ class Reflections:
 def _members(numbers: NDArray[np.int32]) -> list[int]:
     """The numbers from 0 on, each once; faster than `numpy.unique` for few different ones."""
     return np.flatnonzero(np.bincount(numbers + 1)[1:]).tolist()
-
-
-def _unit(rows: Floats) -> Floats:
-    """(n, 3) of length 1, or 0."""
-    length = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    return np.asarray(rows / np.maximum(length, _NONE)[:, None])
