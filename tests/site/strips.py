@@ -111,20 +111,28 @@ def factor(color: tuple[float, float, float]) -> dict[str, Any]:
     return {"pbrMetallicRoughness": {"baseColorFactor": [*color, 1]}}
 
 
-def glb(cell: int, materials: Mapping[str, Mapping[str, Any]]) -> bytes:
-    """A strip of each material."""
+def glb(
+    cell: int,
+    materials: Mapping[str, Mapping[str, Any]],
+    strips: Mapping[str, tuple[float, float]] = STRIPS,
+    bent: Mapping[str, int] | None = None,
+) -> bytes:
+    """A strip of each material, one that blends a millimetre before the others. ``bent``: the x of
+    normals at the ends of strips that have them, of 127."""
     scene = {"extras": {"cell": cell}, "nodes": list(range(len(materials)))}
     tree: dict[str, Any] = {"asset": {"version": "2.0"}, "scenes": [scene], "scene": 0}
     tree |= {"nodes": [], "meshes": [], "materials": [], "accessors": [], "bufferViews": []}
     binary = bytearray()
 
     def add(array: NDArray[Any], kind: str) -> int:
-        view = {"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes}
+        view: dict[str, int] = {"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes}
         tree["bufferViews"].append(view)
-        number = {"float32": 5126, "uint16": 5123}[array.dtype.name]
+        number = {"float32": 5126, "uint16": 5123, "int8": 5120}[array.dtype.name]
         row: dict[str, Any] = {"componentType": number, "count": len(array), "type": kind}
         row["normalized"] = kind == "VEC4"
-        if kind != "SCALAR":
+        if array.dtype == np.int8:
+            row["normalized"], view["byteStride"] = True, array.strides[0]
+        elif kind != "SCALAR":
             row |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
         tree["accessors"].append({"bufferView": len(tree["accessors"]), **row})
         binary.extend(array.tobytes())
@@ -132,10 +140,14 @@ def glb(cell: int, materials: Mapping[str, Mapping[str, Any]]) -> bytes:
         return len(tree["accessors"]) - 1
 
     for number, (name, material) in enumerate(materials.items()):
-        low, high = STRIPS[name]
+        low, high = strips[name]
         corners = np.array([(LEFT, low), (RIGHT, low), (RIGHT, high), (LEFT, high)])
         uv = add(np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float32), "VEC2")
-        attributes = {"POSITION": add(np.insert(corners, 2, Z, axis=1).astype(np.float32), "VEC3")}
+        z = Z + 0.001 * (material.get("alphaMode") == "BLEND")
+        attributes = {"POSITION": add(np.insert(corners, 2, z, axis=1).astype(np.float32), "VEC3")}
+        if bent and name in bent:
+            normals = np.array([(x, 0, 100, 0) for x in (-bent[name], bent[name])], np.int8)
+            attributes["NORMAL"] = add(normals[[0, 1, 1, 0]], "VEC3")
         if "light" in material.get("extras", {}):
             attributes |= {"TEXCOORD_0": uv, "TEXCOORD_1": uv}
         if name == "vertices":

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from browser import Visitor, hurried, new_page, visiting_in
 from engines import PACKAGES, Engine, visiting_by
+from mirrors import mirror_site, mirrors_of
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -194,13 +195,85 @@ def test_each_pixel_follows_the_formula(revisit: Visiting, plain: Site, tone: st
         check_strips(visitor, site, tone, (WIDTH, HEIGHT))
 
 
+def unlike_mirrors(
+    visitor: Visitor, site: Site, size: tuple[int, int], arrives: bool = True
+) -> dict[str, float]:
+    """From the first cell, how far parts are off that are: polished and bent metal, a floor, and
+    glass before a bright and a dark surface."""
+    angle = site.index["viewpoints"][0]["fieldOfView"]
+    expected, parts = mirrors_of(angle, EYES[0], size, arrives)
+    apart = np.abs(visitor.picture() - expected).max(axis=2)
+    errors = {name: float(apart[part].max()) for name, part in parts.items()}
+    return {name: error for name, error in errors.items() if error > 3}
+
+
 @pytest.mark.parametrize("name", PACKAGES)
 def test_other_engines_draw_the_same(
     engines: Callable[[str], Engine], plain: Site, name: str
 ) -> None:
-    site, size = lit_site(plain), (512, 384)
-    with visiting_by(engines(name), site.entries, width=size[0], height=size[1]) as visitor:
-        check_strips(visitor, site, "neutral", size)
+    size = 512, 384
+    for site in (lit_site(plain), mirror_site(plain)):
+        with visiting_by(engines(name), site.entries, width=size[0], height=size[1]) as visitor:
+            if "probe" in site.index["textures"][-2]:
+                stand(visitor, EYES[0])
+                visitor.complete()
+                assert unlike_mirrors(visitor, site, size) == {}
+            else:
+                check_strips(visitor, site, "neutral", size)
+
+
+#: Shrinks a texture by a level.
+SHRINK = """
+(t) => {
+  ptm.freeze(true);
+  const { memory } = ptm.walk, want = memory.held.map((held, k) => held - (k === t));
+  memory.settle(want, new Float64Array(want.length), memory.loss.slice());
+}
+"""
+
+
+def test_reflections_follow_the_formula(revisit: Visiting, plain: Site) -> None:
+    """Without the finest level of the probe, coarser ones mix its parts: its mean counts."""
+    site, size = mirror_site(plain), (WIDTH, HEIGHT)
+    probe = len(site.index["textures"]) - 2
+    with revisit(site, width=WIDTH, height=HEIGHT) as visitor:
+        stand(visitor, EYES[0])
+        levels = visitor.complete()["held"][probe]
+        assert unlike_mirrors(visitor, site, size) == {}
+        visitor.page.evaluate(SHRINK, probe)
+        visitor.until(f"s.held[{probe}] === {levels - 1}")
+        visitor.frames(20)
+        assert unlike_mirrors(visitor, site, size, arrives=False) == {}
+        assert visitor.messages == []
+
+
+def test_without_a_probe(visit: Visiting, plain: Site) -> None:
+    """All directions show its mean."""
+    site = mirror_site(plain)
+    entries = {name: e for name, e in site.entries.items() if name != "data/probe.ptm"}
+    with visit(Site(entries, site.index), width=WIDTH, height=HEIGHT) as visitor:
+        stand(visitor, EYES[0])
+        visitor.page.wait_for_function("ptm.errors.length > 0", timeout=90_000)
+        visitor.complete()
+        assert unlike_mirrors(visitor, site, (WIDTH, HEIGHT), arrives=False) == {}
+
+
+def test_low_quality_reflects_nothing(revisit: Visiting, plain: Site) -> None:
+    """And needs no probe: surfaces are as if no material had one."""
+    site, bare = mirror_site(plain), mirror_site(plain, probe=False)
+    _, parts = mirrors_of(site.index["viewpoints"][0]["fieldOfView"], EYES[0], (WIDTH, HEIGHT))
+    pictures = []
+    for each, query in ((site, "?quality=low"), (bare, "")):
+        with revisit(each, query=query, width=WIDTH, height=HEIGHT) as visitor:
+            stand(visitor, EYES[0])
+            picture = settled(visitor)
+            pictures.append({name: picture[part] for name, part in parts.items()})
+            files = {v.path.rpartition("/")[2] for v in visitor.visits}
+            assert "even.ptm" in files
+            assert "probe.ptm" not in files
+    low, matt = pictures
+    assert all((low[name] == matt[name]).all() for name in parts)
+    assert low["metal"].std(axis=0).max() < 2
 
 
 #: Exposures of a walk through the door, at these cells, places along x and times, s.

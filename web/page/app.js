@@ -43,8 +43,9 @@ export class App {
    * @param {object} begin
    * @param {import("./net/opening.js").Opening | null} begin.opening of the view that the address leads to
    * @param {string} begin.policy one of `POLICIES`
+   * @param {boolean} begin.low whether nothing reflects
    */
-  constructor(canvas, gl, site, config, decoders, { opening, policy }) {
+  constructor(canvas, gl, site, config, decoders, { opening, policy, low }) {
     const query = new URLSearchParams(location.search);
     const small = matchMedia("(pointer: coarse)").matches;
     const megabytes = Number(query.get("memory"));
@@ -56,6 +57,7 @@ export class App {
       opening,
       covered: Boolean(config.poster),
       policy,
+      low,
       budget: megabytes > 0 ? Math.min(megabytes, MOST) * 2 ** 20 : small ? SMALL_BUDGET : BUDGET,
     };
     const walk = (this.walk = new Walkthrough(canvas, gl, site, options, this.emit));

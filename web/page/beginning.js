@@ -13,8 +13,9 @@ export function beginningOf(walk) {
   const parts = +stream.records.has(walk.cell) + +stream.shapes.has(walk.cell);
   let share = 0, total = 0;
   for (let t = 0; t < T; t++) {
-    if (!present || client.downloads.rests("texture", t)) continue;
-    const seen = present[t * K + 1], wanted = Math.min(walk.firstLevels, levels[t]);
+    const seen = present?.[t * K + 1];
+    if (!seen || client.downloads.rests("texture", t)) continue;
+    const wanted = Math.min(walk.firstLevels, levels[t]);
     total += seen;
     share += seen * Math.min(memory.held[t] / wanted, 1);
   }

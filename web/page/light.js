@@ -1,5 +1,5 @@
-// The script of sites with light: it shows surfaces in linear light, exposed for the viewer's cell, and sky and
-// ground around the building (docs/formats/hints.md#colours).
+// The script of sites with light: it shows surfaces in linear light, exposed for the viewer's cell, what they
+// reflect, and sky and ground around the building (docs/formats/hints.md#colours).
 
 /** Seconds in which the exposure nearly reaches that of another cell, metres of a frame that are a jump, and a
  * share of the exposure that does not show. */
@@ -30,26 +30,95 @@ vec3 developed(vec3 light) {
   return mix(curve, 12.92 * light, lessThanEqual(light, vec3(0.0031308)));
 }`;
 
-/** Of vertices: their colours are linear before they are interpolated. */
-const CORNERS = `
+/** Of vertices: their colours are linear before they are interpolated. @param {boolean} reflects */
+const cornersOf = (reflects) => `
 layout(location = 3) in vec2 place2;
 out vec2 spot;
-uniform float white;
+uniform float white;${reflects ? `
+layout(location = 5) in vec3 normal;
+out vec3 bent;
+out vec3 away;` : ""}
 void main() {
-  spot = place2;`;
+  spot = place2;${reflects ? `
+  bent = normal;
+  away = position - eye;` : ""}`;
 
-/** @param {import("./data/site.js").LightRow} row */
-const fragments = ({ stops, tone }) => `
+/** What a surface reflects: Karis' split sum, with an analytic second part, and a probe mirrored in its box. */
+const REFLECTIONS = `
+in vec3 bent; // 0 if flat
+in vec3 away;
+uniform vec3 eye;
+uniform vec3 centre;
+uniform vec3 low;
+uniform vec3 high;
+uniform vec2 polish; // metallic, roughness
+uniform vec2 power; // exposed: of the greatest code, on average
+uniform sampler2D probe;
+uniform vec3 haze; // until the probe arrives, the mean of its codes; negative with it
+vec3 way;
+vec2 part; // of what is reflected: factor of the colour, and a share of white
+vec3 stored(vec2 place, float level) {
+  vec2 corner = vec2(level < 1.0 ? 0.0 : level < 3.0 ? 128.0 : 160.0, level < 2.0 ? 0.0 : 64.0);
+  return textureLod(probe, (corner + 1.0 + place * (exp2(7.0 - level) - 2.0)) / vec2(192.0, 128.0), 0.0).rgb;
+}
+vec3 seenAlong(vec3 ray, float rough) {
+  vec3 share = haze;
+  if (share.r < 0.0) {
+    ray /= abs(ray.x) + abs(ray.y) + abs(ray.z);
+    vec2 place = ray.xz;
+    if (ray.y < 0.0) place = (1.0 - abs(ray.zx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(place, vec2(0.0)));
+    float level = min(floor(3.0 * rough), 2.0);
+    place = place * 0.5 + 0.5;
+    share = mix(stored(place, level), stored(place, level + 1.0), 3.0 * rough - level);
+  }
+  return power.x * exp2(stops * (share - 1.0));
+}
+void meet() {
+  vec3 normal = dot(bent, bent) > 0.0 ? bent : cross(dFdx(away), dFdy(away));
+  vec3 ray = normalize(away);
+  normal *= inversesqrt(max(dot(normal, normal), 1e-36));
+  way = reflect(ray, normal);
+  vec3 at = eye + away, ends = max((high - at) / way, (low - at) / way);
+  way = at + way * max(0.0, min(ends.x, min(ends.y, ends.z))) - centre;
+  vec4 k = polish.y * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+  float share = min(k.x * k.x, exp2(-9.28 * max(abs(dot(normal, ray)), 0.001))) * k.x + k.y;
+  part = vec2(-1.04, 1.04) * share + k.zw;
+}
+vec3 reflected(vec3 base, vec3 light) {
+  meet();
+  vec3 share = mix(vec3(0.04), base, polish.x) * part.x + part.y, image = seenAlong(way, polish.y);
+  image *= mix(1.0, min(1.0, dot(light, vec3(0.2126, 0.7152, 0.0722)) / power.y), polish.y);
+  image = mix(image, light, smoothstep(0.2, 0.8, polish.y)) * share;
+  return base * light * (1.0 - polish.x) * (1.0 - max(share.r, max(share.g, share.b))) + image;
+}`;
+/** Glass hides of what is behind it what it reflects, which is estimated by what is seen along the ray. */
+const GLASS = `
+  if (white == 0.0) {
+    meet();
+    float share = 0.04 * part.x + part.y;
+    share *= 1.9 - 0.9 * share;
+    vec3 behind = seenAlong(away, 1.0), image = developed(behind * (1.0 - share) + seenAlong(way, polish.y) * share);
+    shown.rgb *= shown.a * (1.0 - share);
+    shown.rgb += max(image - (1.0 - share) * developed(behind), 0.0);
+    shown.a += share * (1.0 - shown.a);
+  }
+  `;
+
+/** @param {import("./data/site.js").LightRow} row @param {boolean} reflects */
+const fragmentsOf = ({ stops, tone }, reflects) => `
+const float stops = float(${stops});
 in vec2 spot;
 uniform float white; // exposed; 0 of unlit surfaces
 uniform sampler2D lightmap;
 uniform vec3 code; // 1 of light at vertices; until the lightmap arrives, its mean; negative with it
 ${LINEAR}
 ${developed(tone === "plain" ? "1e30" : undefined)}
+${reflects ? REFLECTIONS : ""}
 vec3 display(vec3 texel) {
   if (white == 0.0) return texel * color.rgb * painted;
   vec3 share = code.r < 0.0 ? texture(lightmap, spot).rgb : code;
-  return developed(linear(texel) * color.rgb * painted * white * exp2(float(${stops}) * (share - 1.0)));
+${reflects ? `  return developed(reflected(linear(texel) * color.rgb * painted, white * exp2(stops * (share - 1.0))));`
+    : `  return developed(linear(texel) * color.rgb * painted * white * exp2(stops * (share - 1.0)));`}
 }
 void main`;
 
@@ -88,23 +157,37 @@ export class Light {
   #jumped = true;
   /** Draws the surroundings. @type {Program | null} */
   #surroundings = null;
+  /** Draws what reflects. @type {Program | null} */
+  #mirror = null;
+  /** How metallic and how rough looks are. @type {WeakMap<import("./data/glb.js").Shape, number[]>} */
+  #polish = new WeakMap();
 
-  /** @param {import("./data/site.js").LightRow} row */
-  constructor(row) {
+  /**
+   * @param {import("./data/site.js").LightRow} row
+   * @param {import("./data/site.js").TextureRow[]} textures
+   */
+  constructor(row, textures) {
     this.row = row;
+    /** Those of textures that are probes, and sound. */
+    this.probes = textures.map(({ probe }) => {
+      const { white, mean, centre, low, high } = /** @type {any} */ (probe ?? {});
+      return [white, mean, ...[centre, low, high].flat()].every(Number.isFinite) ? probe : undefined;
+    });
   }
 
   /**
    * The shaders of surfaces in this light; others stay as they are.
    * @param {string[]} sources
+   * @param {boolean} [reflects]
    */
-  sources([corners, fragment]) {
+  sources([corners, fragment], reflects = false) {
     if (!fragment.includes("painted")) return [corners, fragment];
     const lit = fragment.replace(/sampled\.rgb ?\* ?color\.rgb ?\* ?painted/, "display(sampled.rgb)");
     return [
-      corners.replace(/void main\(\) ?{/, CORNERS)
+      corners.replace(/void main\(\) ?{/, cornersOf(reflects))
         .replace(/painted ?= ?paint\.rgb/, "painted = white > 0.0 ? pow(paint.rgb, vec3(4.0)) : paint.rgb"),
-      lit.replace("void main", fragments(this.row)).replace(/glow ?= ?0\.25/, "glow = white > 0.0 ? 1.0 : 0.7"),
+      lit.replace("void main", fragmentsOf(this.row, reflects)).replace(/if ?\(shown\.a/, `${reflects ? GLASS : ""}$&`)
+        .replace(/glow ?= ?0\.25/, "glow = white > 0.0 ? 1.0 : 0.7"),
     ];
   }
 
@@ -134,22 +217,51 @@ export class Light {
   }
 
   /**
+   * What draws a look that reflects, else null.
+   * @param {Renderer} renderer
+   * @param {import("./data/glb.js").Shape} look
+   */
+  mirrorOf(renderer, { probe }) {
+    if (!this.probes[probe] || this.row.tone === "plain") return null;
+    return (this.#mirror ??= renderer.compile("mirror", undefined, true));
+  }
+
+  /**
    * Sets the uniforms of the light on a look; whether a level of the lightmap fades in.
    * @param {Renderer} renderer
    * @param {Program["at"]} at
    * @param {import("./data/glb.js").Shape} look
    * @param {number} now s
    */
-  paint({ gl, memory, means }, at, { white, light }, now) {
-    gl.uniform1f(at.white, white * this.exposure);
-    const map = light < 0 ? null : memory.of(light);
-    gl.uniform3fv(at.code, map ? [-1, -1, -1] : means[light] ?? [1, 1, 1]);
-    if (!map) return false;
-    gl.activeTexture(gl.TEXTURE1);
-    const fading = map.bind(true, true, now);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.uniform1i(at.lightmap, 1);
-    return fading;
+  paint({ gl, memory, means }, at, look, now) {
+    const { white, light, probe, extras } = look;
+    const { exposure, probes: { [probe]: mirrored } } = this;
+    gl.uniform1f(at.white, white * exposure);
+    /** Of codes: their mean, until levels are there. @type {(number: number, levels: number, mean: string, map: string, unit: number) => boolean} */
+    const bind = (number, levels, mean, map, unit) => {
+      const storage = number < 0 ? null : memory.of(number), there = storage && storage.levels >= levels;
+      gl.uniform3fv(at[mean], there ? [-1, -1, -1] : means[number] ?? [1, 1, 1]);
+      if (!there) return false;
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      // A probe, whose other levels mix its parts, does not fade in.
+      const fading = storage.bind(true, true, levels ? Infinity : now);
+      if (levels) gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+      gl.activeTexture(gl.TEXTURE0);
+      gl.uniform1i(at[map], unit);
+      return fading;
+    };
+    if (mirrored && at.polish) {
+      let polish = this.#polish.get(look);
+      if (!polish) {
+        const { metallicFactor = 0, roughnessFactor = 1 } = JSON.parse(extras);
+        this.#polish.set(look, (polish = [metallicFactor, roughnessFactor]));
+      }
+      gl.uniform2fv(at.polish, polish);
+      gl.uniform2f(at.power, mirrored.white * exposure, Math.max(mirrored.mean * exposure, 1e-30));
+      for (const name of /** @type {const} */ (["centre", "low", "high"])) gl.uniform3fv(at[name], mirrored[name]);
+      bind(probe, memory.rows[probe].sizes.length, "haze", "probe", 3);
+    }
+    return bind(light, 0, "code", "lightmap", 1);
   }
 
   /**
@@ -158,7 +270,7 @@ export class Light {
    * @param {import("./gl/camera.js").Camera} camera
    */
   surround(renderer, { turn, lens }) {
-    const { gl, surface } = renderer, { row: { tone, sky = [], ground = [] }, exposure } = this;
+    const { gl } = renderer, { row: { tone, sky = [], ground = [] }, exposure } = this;
     if (tone === "plain") return;
     const { program, at } = (this.#surroundings ??= renderer.compile("surroundings", [BEHIND, SURROUNDINGS]));
     gl.useProgram(program);
@@ -170,7 +282,6 @@ export class Light {
     gl.depthFunc(gl.LEQUAL);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.depthFunc(gl.LESS);
-    gl.useProgram(surface.program);
   }
 }
 
@@ -180,7 +291,7 @@ export class Light {
  */
 export function show({ comparison, index, picture: { renderer } }) {
   if (!index.light) return;
-  const light = new Light(index.light);
+  const light = new Light(index.light, index.textures);
   light.illuminate(renderer);
   if (comparison) light.illuminate(comparison.renderer);
 }

@@ -51,12 +51,13 @@ async function main() {
     // The page knows whether there is one of the view that its address leads to.
     const preload = /** @type {HTMLLinkElement | null} */ (document.querySelector("#opening[rel=preload]"));
     const opening = preload ? new Opening(preload.href) : null;
-    const gl = contextOf(canvas);
+    const query = new URLSearchParams(location.search), low = query.get("quality") === "low";
+    const gl = contextOf(canvas, low);
     await speaking;
     if (!gl) throw new PageError("PTM-V101", page.noWebgl);
-    const query = new URLSearchParams(location.search), policy = query.get("policy") ?? "best";
+    const policy = query.get("policy") ?? "best";
     const known = await loadPolicy(policy).catch(() => false);
-    const options = { opening, policy: known ? policy : "best" };
+    const options = { opening, policy: known ? policy : "best", low };
     const form = query.get("form") === "gpuii" && await loadSets();
     const attach = form && await form.setsOf(await site, gl, options, new Fetcher(() => {}));
     const app = new App(canvas, gl, await site, config, decoders, options);

@@ -65,11 +65,12 @@ export class Walkthrough {
    * @param {import("./net/opening.js").Opening | null} options.opening
    * @param {string} options.policy
    * @param {number} options.budget bytes of texture memory
+   * @param {boolean} options.low whether nothing reflects
    * @param {boolean} options.covered whether a poster covers the picture until the walk begins
    * @param {import("./app.js").App["emit"]} emit
    */
-  constructor(canvas, gl, site, { decoders, opening, policy, budget, covered }, emit) {
-    const index = fitting(site.index, gl.getParameter(gl.MAX_TEXTURE_SIZE)), { textures } = index;
+  constructor(canvas, gl, site, { decoders, opening, policy, budget, low, covered }, emit) {
+    const index = fitting(site.index, gl.getParameter(gl.MAX_TEXTURE_SIZE), low), { textures } = index;
     const catalogue = catalogueOf(index), estimate = new Estimate();
     const fetcher = new Fetcher((message) => emit("notice", { message }));
     watchLink(estimate, fetcher);

@@ -20,9 +20,11 @@
  * @property {number} light the lightmap of its cell in the index, or -1
  * @property {number} white the light that its lightmap calls white, or that its colours are shares of; 0 if unlit
  * @property {Float32Array | null} spots u, v of each vertex in the lightmap, from the top left
+ * @property {number} probe the place in the index of what it reflects, or -1
+ * @property {Numbers | null} normals x, y, z of each vertex, of 127, if it reflects and is curved
  * @property {number} relief the place of the normal map of its object or its material in the index, or -1
  * @property {Float32Array[] | null} frames of the vertices in the normal map, as `Reliefs` checks them
- * @property {string} extras those of its material as JSON, without the mesh
+ * @property {string} extras those of its material as JSON, without the mesh, and its factors
  * @property {number[]} low corner of their box
  * @property {number[]} high
  */
@@ -31,13 +33,13 @@ const GLTF = 0x46546c67, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942;
 const CLAMP = 33071;
 /** Milliseconds of reading without a pause. */
 const AT_ONCE = 6;
-/** @type {Record<number, typeof Float32Array | typeof Uint16Array | typeof Uint32Array>} */
-const ARRAYS = { 5126: Float32Array, 5123: Uint16Array, 5125: Uint32Array };
+/** @type {Record<number, typeof Float32Array | typeof Int8Array | typeof Uint16Array | typeof Uint32Array>} */
+const ARRAYS = { 5126: Float32Array, 5120: Int8Array, 5123: Uint16Array, 5125: Uint32Array };
 /** @type {Record<string, number>} */
 const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 /** @typedef {import("../../ptm/src/meshopt.js").ViewDecoder} ViewDecoder */
-/** @typedef {Float32Array | Uint16Array | Uint32Array} Numbers */
+/** @typedef {Float32Array | Int8Array | Uint16Array | Uint32Array} Numbers */
 
 /** The arrays of a GLB, by the numbers of their accessors. */
 class Arrays {
@@ -103,7 +105,7 @@ class Arrays {
     const view = this.tree.bufferViews[number], coded = this.#coded(number);
     if (!coded) {
       const begin = view.byteOffset ?? 0;
-      return { bytes: this.binary.subarray(begin, begin + view.byteLength), stride: 0 };
+      return { bytes: this.binary.subarray(begin, begin + view.byteLength), stride: view.byteStride ?? 0 };
     }
     let bytes = /** @type {Uint8Array<ArrayBuffer> | undefined} */ (this.#decoded.get(number));
     if (!bytes) {
@@ -175,7 +177,7 @@ export async function readGlb(buffer, textures, decoder) {
   for (const node of tree.nodes ?? []) {
     for (const { attributes, indices, material } of tree.meshes[node.mesh].primitives) {
       const look = tree.materials[material], base = look.pbrMetallicRoughness ?? {};
-      const { texture = -1, mesh = -1, octree = -1, light = -1, white = light < 0 ? 0 : NaN, normal = -1, normalCoords = 1, wrapS, wrapT } =
+      const { texture = -1, mesh = -1, octree = -1, light = -1, white = light < 0 ? 0 : NaN, probe = -1, normal = -1, normalCoords, wrapS, wrapT } =
         look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const painted = attributes.COLOR_0 !== undefined;
@@ -184,10 +186,11 @@ export async function readGlb(buffer, textures, decoder) {
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
       const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
       const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
-      const frames = normal < 0 ? null : ["TEXCOORD_" + normalCoords, "NORMAL", "TANGENT"]
-        .filter((name) => name in attributes)
+      const normals = probe >= 0 && "NORMAL" in attributes ? arrays.vertices(attributes.NORMAL) : null;
+      const framed = normalCoords === undefined ? ["TEXCOORD_1", "NORMAL", "TANGENT"] : ["TEXCOORD_" + normalCoords];
+      const frames = normal < 0 ? null : framed.filter((name) => name in attributes)
         .map((name) => /** @type {Float32Array} */ (arrays.vertices(attributes[name])));
-      if (![texture, light].every((number) => Number.isInteger(number) && number < textures)) {
+      if (![texture, light, probe].every((number) => Number.isInteger(number) && number < textures)) {
         throw new Error("has a texture that is not in the index");
       }
       const factor = base.baseColorFactor ?? [1, 1, 1, 1];
@@ -201,7 +204,7 @@ export async function readGlb(buffer, textures, decoder) {
       await pause();
       const index = arrays.indices(indices, positions.length / 3);
       await pause();
-      const own = ownOf(index, { positions, uvs, colors, spots, frames });
+      const own = ownOf(index, { positions, uvs, colors, spots, normals, frames });
       const { low, high } = boxOf(own.positions);
       shapes.push({
         name: node.name ?? "",
@@ -217,8 +220,9 @@ export async function readGlb(buffer, textures, decoder) {
         octree,
         light,
         white,
+        probe,
         relief: normal,
-        extras: JSON.stringify({ ...look.extras, mesh: 0 }),
+        extras: JSON.stringify({ ...base, ...look.extras, mesh: 0 }),
         low,
         high,
       });
@@ -231,9 +235,9 @@ export async function readGlb(buffer, textures, decoder) {
  * The vertices of one shape, of an array that it may share with others.
  * @param {Uint16Array | Uint32Array} index
  * @param {{positions: Float32Array, uvs: Float32Array | null, colors: Uint16Array | null,
- *   spots: Float32Array | null, frames: Float32Array[] | null}} shared
+ *   spots: Float32Array | null, normals: Numbers | null, frames: Float32Array[] | null}} shared
  */
-function ownOf(index, { positions, uvs, colors, spots, frames }) {
+function ownOf(index, { positions, uvs, colors, spots, normals, frames }) {
   let first = Infinity, last = -1;
   for (let k = 0; k < index.length; k++) {
     if (index[k] < first) first = index[k];
@@ -247,6 +251,7 @@ function ownOf(index, { positions, uvs, colors, spots, frames }) {
     uvs: uvs && uvs.subarray(2 * first, 2 * end),
     colors: colors && colors.subarray(4 * first, 4 * end),
     spots: spots && spots.subarray(2 * first, 2 * end),
+    normals: normals && normals.subarray(3 * first, 3 * end),
     frames: frames && frames.map((rows, k) => rows.subarray((k + 2) * first, (k + 2) * end)),
     indices,
   };

@@ -36,6 +36,14 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {string} [relief]
  * @property {boolean} [normals]
  * @property {number} [light]
+ * @property {Probe} [probe]
+ *
+ * @typedef {object} Probe a panorama of light, as seen from a point of a cell (docs/formats/hints.md)
+ * @property {number} white
+ * @property {number} mean
+ * @property {number[]} centre
+ * @property {number[]} low corner of the box in which it is mirrored
+ * @property {number[]} high
  *
  * @typedef {object} LightRow the curve and the surroundings of all light (docs/formats/hints.md)
  * @property {number} stops
@@ -145,10 +153,14 @@ export class Site {
  * An index without the levels that a GPU cannot hold, and without those that only their previews reached.
  * @param {Index} index
  * @param {number} side texels at most
+ * @param {boolean} [matt] whether nothing reflects: probes have no levels then
  * @returns {Index}
  */
-export function fitting(index, side) {
+export function fitting(index, side, matt) {
   const textures = index.textures.map((row) => {
+    if (matt && row.probe) {
+      return { ...row, probe: undefined, previews: [], ends: [], differences: [], offsets: [] };
+    }
     let beyond = 0;
     while (Math.max(row.width, row.height) >> beyond > side) beyond++;
     const kept = row.ends.length - beyond;

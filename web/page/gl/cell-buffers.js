@@ -17,8 +17,10 @@
 /**
  * @typedef {object} Packed
  * @property {Float32Array} data x, y, z, u, v of each vertex; its place u, v in the lightmap, if any has one;
+ *   its normal, if any has one, in the bytes of one number, 0 of those without;
  *   and its colour, if any has one: r, g, b, 1 as `codeOf` encodes them, in the bytes of one number
  * @property {boolean} lit whether they have a place in the lightmap
+ * @property {boolean} curved whether they have a normal
  * @property {boolean} painted whether they have a colour
  * @property {Uint16Array | Uint32Array} index
  * @property {Batch[]} batches
@@ -51,7 +53,7 @@ export function* pack(shapes) {
   const vertices = shapes.reduce((sum, { positions }) => sum + positions.length / 3, 0);
   const count = shapes.reduce((sum, { indices }) => sum + indices.length, 0);
   const lit = shapes.some(({ spots }) => spots), painted = shapes.some(({ colors }) => colors);
-  const width = 5 + 2 * +lit + +painted;
+  const curved = shapes.some(({ normals }) => normals), end = 5 + 2 * +lit, width = end + +curved + +painted;
   const data = new Float32Array(width * vertices), bytes = new Uint8Array(data.buffer);
   // 65535 begins another strip.
   const index = vertices > 65535 ? new Uint32Array(count) : new Uint16Array(count);
@@ -60,7 +62,7 @@ export function* pack(shapes) {
   let vertex = 0, at = 0;
   for (const group of groups.values()) {
     const first = at, [look] = group, { factor, white } = look;
-    for (const { positions, uvs, colors, spots, indices } of group) {
+    for (const { positions, uvs, colors, spots, normals, indices } of group) {
       yield;
       for (let k = 0; k < indices.length; k++) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
@@ -68,7 +70,10 @@ export function* pack(shapes) {
       }
       for (let k = 0; k < positions.length / 3; k++, vertex++) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
-        for (let n = 0; n < 3; n++) data[width * vertex + n] = positions[3 * k + n];
+        for (let n = 0; n < 3; n++) {
+          data[width * vertex + n] = positions[3 * k + n];
+          if (normals) bytes[4 * (width * vertex + end) + n] = normals[3 * k + n];
+        }
         for (let n = 0; painted && n < 4; n++) {
           bytes[4 * (width * (vertex + 1) - 1) + n] = colors ? 255 * codeOf(colors[4 * k + n] / 65535, white) + 0.5 : 255;
         }
@@ -86,7 +91,7 @@ export function* pack(shapes) {
       yield;
     }
   }
-  return { data, lit, painted, index, batches };
+  return { data, lit, curved, painted, index, batches };
 }
 
 /**
@@ -112,7 +117,7 @@ export class CellBuffers {
    * @param {Packed} packed
    * @param {Shape[]} shapes those that were packed
    */
-  constructor(gl, { data, lit, painted, index, batches }, shapes) {
+  constructor(gl, { data, lit, curved, painted, index, batches }, shapes) {
     this.gl = gl;
     this.shapes = shapes;
     this.batches = batches;
@@ -125,16 +130,18 @@ export class CellBuffers {
     gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[1]);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
-    const end = lit ? 28 : 20, stride = end + 4 * +painted;
-    const attribute = (/** @type {number} */ place, /** @type {number} */ count, /** @type {number} */ from) => {
+    const end = lit ? 28 : 20, far = end + 4 * +curved, stride = far + 4 * +painted;
+    /** @param {number} place @param {number} count @param {number} from @param {number} [kind] */
+    const attribute = (place, count, from, kind = gl.FLOAT) => {
       gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, count, count < 4 ? gl.FLOAT : gl.UNSIGNED_BYTE, count > 3, stride, from);
+      gl.vertexAttribPointer(place, count, kind, kind !== gl.FLOAT, stride, from);
     };
     attribute(0, 3, 0);
     attribute(1, 2, 12);
     gl.vertexAttrib4f(2, 1, 1, 1, 1);
-    if (painted) attribute(2, 4, end);
+    if (painted) attribute(2, 4, far, gl.UNSIGNED_BYTE);
     if (lit) attribute(3, 2, 20);
+    if (curved) attribute(5, 3, end, gl.BYTE);
     gl.bindVertexArray(null);
   }
 

@@ -1,9 +1,13 @@
 // The drawing context of a page.
 
-/** Smooth edges cost too much without a graphics card. @param {HTMLCanvasElement} canvas */
-export function contextOf(canvas) {
+/**
+ * Smooth edges cost too much without a graphics card.
+ * @param {HTMLCanvasElement} canvas
+ * @param {boolean} [low] whether the visitor asks for less quality
+ */
+export function contextOf(canvas, low) {
   const options = { antialias: true, failIfMajorPerformanceCaveat: true };
   const plain = { antialias: false };
-  const gl = canvas.getContext("webgl2", options) ?? canvas.getContext("webgl2", plain);
+  const gl = (low ? null : canvas.getContext("webgl2", options)) ?? canvas.getContext("webgl2", plain);
   return /** @type {WebGL2RenderingContext | null} */ (gl);
 }

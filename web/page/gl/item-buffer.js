@@ -12,7 +12,7 @@ import { ITEMS, PLACEHOLDERS } from "./shaders.js";
  * @typedef {object} Reading
  * @property {number} pixels
  * @property {Uint16Array} items two numbers a pixel: pair + 1, level of detail · 256
- * @property {number[][]} pairs textures and lightmaps that are seen together, -1 for none
+ * @property {number[][]} pairs textures, lightmaps and probes that are seen together, -1 for none
  * @property {Uint16Array | null} placeholders the first is the cell + 1; null if none were drawn
  * @property {number} drawn when, s
  */
@@ -110,10 +110,10 @@ export class ItemBuffer {
     for (const { buffers, batches } of drawn) {
       gl.bindVertexArray(buffers.vertexArray);
       for (const batch of batches) {
-        const { texture, light, blends, twoSided } = batch.look, pair = [texture, light], key = pair.join();
+        const { texture, light, probe, blends, twoSided } = batch.look, pair = [texture, light, probe], key = pair.join();
+        if (!items.has(key)) items.set(key, this.#pairs.push(pair));
         if (blends && texture < 0) continue;
         (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
-        if (!items.has(key)) items.set(key, this.#pairs.push(pair));
         gl.uniform1f(item.at.item, /** @type {number} */ (items.get(key)));
         const { width, height } = rows[texture] ?? { width: 1, height: 1 };
         gl.uniform2f(item.at.size, width, height);

@@ -23,6 +23,8 @@ export class Renderer {
   cells = new Map();
   /** Packing of cells under way. @type {Map<number, {shapes: Shape[], steps: ReturnType<typeof pack>}>} */
   #packing = new Map();
+  /** The program in use. @type {import("./program.js").Program | null} */
+  #used = null;
 
   /**
    * @param {WebGL2RenderingContext} gl
@@ -78,9 +80,10 @@ export class Renderer {
    * A program for surfaces, in the light of the site.
    * @param {string} name
    * @param {string[]} [sources] of the shaders
+   * @param {boolean} [reflects] whether for those that reflect
    */
-  compile(name, sources = SURFACES) {
-    return programOf(this.gl, name, this.light?.sources(sources) ?? sources);
+  compile(name, sources = SURFACES, reflects) {
+    return programOf(this.gl, name, this.light?.sources(sources, reflects) ?? sources);
   }
 
   delete() {
@@ -102,13 +105,13 @@ export class Renderer {
    * @param {number} now s
    */
   draw(camera, drawn, now) {
-    const { gl, surface } = this;
+    const { gl } = this;
     gl.clearColor(0.16, 0.17, 0.19, 1);
     gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.disable(gl.BLEND);
-    aim(gl, surface, camera);
+    this.#used = null;
     let fading = false;
     /** @type {{buffers: CellBuffers, batch: Batch, far: number}[]} */
     const behind = [], statues = [];
@@ -120,23 +123,22 @@ export class Renderer {
         } else if (this.statues?.has(batch.look)) {
           statues.push({ buffers, batch });
         } else {
-          fading = this.#draw(buffers, batch, now) || fading;
+          fading = this.#draw(camera, buffers, batch, now) || fading;
         }
       }
     }
     if (statues.length) {
       const paint = (/** @type {any} */ at, /** @type {Batch} */ batch) => this.#paint(at, batch, now);
       fading = this.statues?.draw(camera, statues, paint, now) || fading;
-      gl.useProgram(surface.program);
     }
     this.light?.surround(this, camera);
+    this.#used = null;
     if (behind.length) {
       gl.enable(gl.BLEND);
-      gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       gl.depthMask(false);
       for (const { buffers, batch } of behind.sort((a, b) => b.far - a.far)) {
         gl.bindVertexArray(buffers.vertexArray);
-        fading = this.#draw(buffers, batch, now) || fading;
+        fading = this.#draw(camera, buffers, batch, now) || fading;
       }
     }
     gl.bindVertexArray(null);
@@ -144,12 +146,18 @@ export class Renderer {
   }
 
   /**
+   * @param {import("./camera.js").Camera} camera
    * @param {CellBuffers} buffers
    * @param {Batch} batch
    * @param {number} now
    */
-  #draw(buffers, batch, now) {
-    const fading = this.#paint(this.surface.at, batch, now);
+  #draw(camera, buffers, batch, now) {
+    const { gl } = this, { look } = batch, mirror = this.light?.mirrorOf(this, look), use = mirror ?? this.surface;
+    if (use !== this.#used) aim(gl, (this.#used = use), camera);
+    // Glass comes with its reflection, which does not fade with its colour.
+    const source = mirror && !look.white ? gl.ONE : gl.SRC_ALPHA;
+    gl.blendFuncSeparate(source, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    const fading = this.#paint(use.at, batch, now);
     buffers.draw(batch);
     return fading;
   }

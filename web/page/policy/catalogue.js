@@ -47,7 +47,7 @@ import { meshesOf } from "./meshes.js";
  * @property {{width: number, height: number, components: number, texelBytes: number,
  *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[],
  *   previews?: {level: number, width: number, height: number, bytes: number, difference: number,
- *   exact?: boolean}[]}[]} textures
+ *   exact?: boolean}[], probe?: object}[]} textures
  * @property {Parameters<typeof meshesOf>[0]} [meshes]
  * @property {{box: number[], recordBytes?: number, geometryBytes?: number}[]} cells
  */
@@ -69,11 +69,13 @@ export function catalogueOf({ textures, cells, meshes = [] }) {
   textures.forEach((texture, t) => {
     const { components, texelBytes } = texture, sizes = levelSizes(texture);
     const texel = texture.gpuTexelBytes ?? (components === 3 ? (texelBytes / 3) * 4 : texelBytes);
+    // Coarser levels of a probe are of no use.
+    const first = texture.probe ? levels[t] : 1;
     for (let k = 1; k < K; k++) {
       const at = t * K + k, size = sizes[k - 1];
       ends[at] = texture.ends[k - 1] ?? ends[at - 1];
       memory[at] = memory[at - 1] + (size ? size.width * size.height * texel : 0);
-      differences[at] = size ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST_DIFFERENCE) : 0;
+      differences[at] = size && k >= first ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST_DIFFERENCE) : 0;
     }
     whole += memory[t * K + K - 1];
   });

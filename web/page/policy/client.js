@@ -101,7 +101,7 @@ export class Client {
 
   /**
    * @param {number} cell
-   * @param {{texture: number, light?: number, low: number[], high: number[]}[]} shapes
+   * @param {{texture: number, light?: number, probe?: number, low: number[], high: number[]}[]} shapes
    */
   learnGeometry(cell, shapes) {
     this.shapes[cell] = shapesOf(shapes);

@@ -26,7 +26,7 @@
  */
 
 /**
- * The shapes of a cell that have a texture, once more those that have a lightmap.
+ * The shapes of a cell that have a texture, once more those that have a lightmap, and a probe.
  * @typedef {{textures: Int32Array, boxes: Float64Array}} Shapes which texture; the low and the high
  *   corner of each, six numbers, metres
  */
@@ -45,12 +45,13 @@ export function knownOf({ adjacent, visible, ach, floor, textures, need, leaves,
 }
 
 /**
- * @param {{texture: number, light?: number, low: number[], high: number[]}[]} all
+ * @param {{texture: number, light?: number, probe?: number, low: number[], high: number[]}[]} all
  * @returns {Shapes}
  */
 export function shapesOf(all) {
-  const lit = all.map((shape) => ({ ...shape, texture: shape.light ?? -1 }));
-  const shapes = [...all, ...lit].filter((shape) => shape.texture >= 0);
+  const shapes = all.flatMap((shape) =>
+    [shape.texture, shape.light ?? -1, shape.probe ?? -1].map((texture) => ({ ...shape, texture })))
+    .filter((shape) => shape.texture >= 0);
   return {
     textures: Int32Array.from(shapes, (shape) => shape.texture),
     boxes: Float64Array.from(shapes.flatMap((shape) => [...shape.low, ...shape.high])),

@@ -15,9 +15,13 @@
 export function sightOf({ pixels, items, pairs, placeholders }, { T, C, K, levels }) {
   const present = new Float64Array(T * K), hidden = new Float64Array(C);
   const each = 1 / pixels;
+  const reflects = (/** @type {number} */ probe) => probe >= 0 && (present[probe * K + levels[probe]] += each);
+  // Glass covers no pixel.
+  for (const [, , probe] of pairs) reflects(probe);
   for (let at = 0; at < 2 * pixels; at += 2) {
     if (!items[at]) continue;
-    const [texture, light] = pairs[items[at] - 1];
+    const [texture, light, probe] = pairs[items[at] - 1];
+    reflects(probe);
     // A texel of a lightmap is so large that every pixel wants the finest level.
     for (let k = 0; light >= 0 && k < levels[light]; k++) present[light * K + 1 + k] += each;
     if (texture < 0) continue;

@@ -100,6 +100,9 @@ export class Reliefs {
     this.walk = walk;
     this.program = renderer.compile("relief", [VERTEX, FRAGMENT]);
     this.bumps = renderer.compile("bumps", BUMPS);
+    const { light } = renderer;
+    /** Of materials that reflect. */
+    this.mirrors = light?.probes.some(Boolean) ? renderer.compile("bumps", BUMPS, true) : this.bumps;
     weigh(walk.client.catalogue, walk.index.textures);
   }
 
@@ -232,7 +235,7 @@ export class Reliefs {
    */
   draw(camera, batches, paint, now) {
     const { gl, walk } = this;
-    for (const program of [this.program, this.bumps]) {
+    for (const program of [this.program, this.bumps, this.mirrors]) {
       aim(gl, program, camera);
       gl.uniform1i(program.at.relief, 2);
     }
@@ -245,7 +248,8 @@ export class Reliefs {
       const { relief, extras } = batch.look, bumps = isBump(batch.look);
       const { normalScale: scale = 1, normalWrapS, normalWrapT } = bumps ? JSON.parse(extras) : WHOLE;
       const clampU = normalWrapS === CLAMP, clampV = normalWrapT === CLAMP;
-      const program = bumps ? this.bumps : this.program;
+      const glossy = bumps && walk.picture.renderer.light?.mirrorOf(walk.picture.renderer, batch.look);
+      const program = glossy ? this.mirrors : bumps ? this.bumps : this.program;
       gl.useProgram(program.program);
       gl.uniform1f(program.at.scale, scale);
       gl.activeTexture(gl.TEXTURE2);
@@ -267,7 +271,7 @@ export class Reliefs {
   #part(shape) {
     const known = this.#parts.get(shape);
     if (known) return known;
-    const { gl } = this, { positions, uvs, colors, indices, frames, spots, white } = shape;
+    const { gl } = this, { positions, uvs, colors, indices, frames, spots, normals: curved, white } = shape;
     const array = gl.createVertexArray(), count = indices.length;
     gl.bindVertexArray(array);
     /** @type {WebGLBuffer[]} */
@@ -276,7 +280,8 @@ export class Reliefs {
     const painted = colors && Float32Array.from(colors, (light) => codeOf(light / 65535, white));
     /** @type {[number, Float32Array | null, number][]} */
     const rows = [[0, positions, 3], [1, uvs, 2], [2, painted, 4], [3, spots, 2], [4, places, 2]];
-    if (!isBump(shape)) rows.push([5, normals, 3], [6, tangents, 4]);
+    if (isBump(shape)) rows.push([5, curved && Float32Array.from(curved), 3]);
+    else rows.push([5, normals, 3], [6, tangents, 4]);
     for (const [location, data, size] of rows) {
       if (!data) continue;
       buffers.push(this.#buffer(gl.ARRAY_BUFFER, data));
