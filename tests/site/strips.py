@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.output.gltf import pack
+from ptmtools.rendering.tone import agx
 from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.site.content import Site
 from ptmtools.site.entry import SiteEntry
@@ -165,6 +166,8 @@ def developed(light: Floats, tone: str) -> Floats:
     """sRGB, 0 to 1, of exposed linear light (docs/formats/hints.md)."""
     if tone == "plain":
         return to_srgb(light.clip(0, 1))
+    if tone == "agx":
+        return to_srgb(agx(light))
     peak = light.max(axis=-1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         pressed = 1 - 0.04 / (peak - 0.6)

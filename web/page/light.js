@@ -13,19 +13,28 @@ vec3 linear(vec3 color) {
   return mix(curve, color / 12.92, lessThanEqual(color, vec3(0.04045)));
 }`;
 
-/**
- * The colour of linear light on the screen. From a knee on, the curve is Khronos PBR Neutral without its offset,
- * which makes up for reflections.
- * @param {string} [knee]
- */
-const developed = (knee = "0.8") => `
-vec3 developed(vec3 light) {
+/** The tone curves: Khronos PBR Neutral without its offset, which makes up for reflections; AgX. */
+const CURVES = {
+  plain: "",
+  neutral: `
   float most = max(light.r, max(light.g, light.b));
-  if (most > ${knee}) {
+  if (most > 0.8) {
     float peak = 1.0 - 0.04 / (most - 0.6);
     light = mix(light * (peak / most), vec3(peak), 1.0 - 1.0 / (0.15 * (most - peak) + 1.0));
-  }
-  light = min(light, 1.0);
+  }`,
+  agx: `
+  light *= mat3(0.544815, 0.373787, 0.081384, 0.140417, 0.754152, 0.105431, 0.088811, 0.178876, 0.732313);
+  vec3 y = clamp(log2(max(light, 1e-9)) / 16.5 + 0.755995, 0.0, 1.0);
+  light = (((((15.5 * y - 40.14) * y + 31.96) * y - 6.868) * y + 0.4298) * y + 0.1191) * y - 0.00232;
+  light *= mat3(1.127101, -0.110607, -0.016494, -0.14133, 1.157824, -0.016494, -0.14133, -0.110607, 1.251936);
+  light = pow(max(light, 0.0), vec3(2.2));
+  light *= mat3(1.660491, -0.587641, -0.07285, -0.12455, 1.1329, -0.008349, -0.018151, -0.100579, 1.11873);`,
+};
+
+/** The colour of linear light on the screen. @param {import("./data/site.js").LightRow["tone"]} tone */
+const developed = (tone) => `
+vec3 developed(vec3 light) {${CURVES[tone] ?? CURVES.neutral}
+  light = clamp(light, 0.0, 1.0);
   vec3 root = sqrt(light), curve = 0.29812 * sqrt(root) + 0.83374 * root - 0.05531 * light - 0.07691;
   return mix(curve, 12.92 * light, lessThanEqual(light, vec3(0.0031308)));
 }`;
@@ -112,7 +121,7 @@ uniform float white; // exposed; 0 of unlit surfaces
 uniform sampler2D lightmap;
 uniform vec3 code; // 1 of light at vertices; until the lightmap arrives, its mean; negative with it
 ${LINEAR}
-${developed(tone === "plain" ? "1e30" : undefined)}
+${developed(tone)}
 ${reflects ? REFLECTIONS : ""}
 vec3 display(vec3 texel) {
   if (white == 0.0) return texel * color.rgb * painted;
@@ -133,13 +142,14 @@ void main() {
   way = inverse(turn) * vec3(corner / lens.xy, -1.0);
   gl_Position = vec4(corner, 1.0, 1.0);
 }`;
-const SURROUNDINGS = `#version 300 es
+/** @param {import("./data/site.js").LightRow["tone"]} tone */
+const surroundingsIn = (tone) => `#version 300 es
 precision highp float;
 in vec3 way;
 uniform vec3 sky;
 uniform vec3 ground;
 out vec4 shown;
-${developed()}
+${developed(tone)}
 void main() {
   shown = vec4(developed(mix(ground, sky, smoothstep(-0.02, 0.02, normalize(way).y))), 1.0);
 }`;
@@ -272,7 +282,7 @@ export class Light {
   surround(renderer, { turn, lens }) {
     const { gl } = renderer, { row: { tone, sky = [], ground = [] }, exposure } = this;
     if (tone === "plain") return;
-    const { program, at } = (this.#surroundings ??= renderer.compile("surroundings", [BEHIND, SURROUNDINGS]));
+    const { program, at } = (this.#surroundings ??= renderer.compile("surroundings", [BEHIND, surroundingsIn(tone)]));
     gl.useProgram(program);
     gl.uniformMatrix3fv(at.turn, false, turn);
     gl.uniform4fv(at.lens, lens);

@@ -47,7 +47,7 @@ import { levelSizes } from "../../client/src/levels.js";
  *
  * @typedef {object} LightRow the curve and the surroundings of all light (docs/formats/hints.md)
  * @property {number} stops
- * @property {string} tone "plain", else that of `Light`
+ * @property {"plain" | "neutral" | "agx"} tone
  * @property {number[]} [sky]
  * @property {number[]} [ground]
  *
