@@ -25,6 +25,7 @@ from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.site.content import SiteOptions, site_of  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
+from tests.site.mirrors import mirror_site, mirrors_of  # noqa: E402
 from tests.site.strips import EXPOSURE, EYES, lit_site, view_of  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
 
@@ -364,3 +365,48 @@ def test_three_js_follows_the_formula_of_light(
     before, *_, soon, late, after = answer["exposures"]
     assert (before, late, after) == (more, less, more)
     assert less <= soon < more
+
+
+MIRRORS = """
+const pictures = [], textures = [];
+for (const reflections of [true, false]) {
+  const walk = await Walk.open(renderer, "/www/hints.json", { reflections });
+  const camera = new THREE.PerspectiveCamera(
+    THREE.MathUtils.radToDeg(settings.angle), settings.width / settings.height, 0.05, 1000);
+  const scene = new THREE.Scene().add(walk.shown);
+  camera.position.set(...settings.eye);
+  await walk.enter(0);
+  renderer.render(scene, camera);
+  pictures.push(renderer.domElement.toDataURL("image/png"));
+  textures.push(walk.textures.map(({ number }) => number));
+  walk.dispose();
+}
+return { pictures, textures };
+"""
+
+
+def test_three_js_follows_the_formula_of_reflections(
+    three: Any, lit_rooms: Path, tmp_path: Path
+) -> None:
+    """Of metal, flat and bent, of a floor, and of glass before a bright and a dark surface."""
+    site = mirror_site(site_of(lit_rooms / "plain", SiteOptions(pictures=False, opening=False)))
+    for name, entry in site.entries.items():
+        if name.startswith("data/"):
+            path = "hints.json" if "/index-" in name else name.removeprefix("data/")
+            (tmp_path / path).write_bytes(entry.read())
+    width, height = 320, 240
+    angle = site.index["viewpoints"][0]["fieldOfView"]
+    settings = {"width": width, "height": height, "angle": angle, "eye": EYES[0]}
+    answer, visit = three.run(MIRRORS, {"www": tmp_path}, **settings)
+    assert visit.messages == []
+    expected, parts = mirrors_of(angle, EYES[0], (width, height), shaded=False)
+    probe = len(site.index["textures"]) - 2
+    for reflects, png, textures in zip(
+        (True, False), answer["pictures"], answer["textures"], strict=True
+    ):
+        assert (probe in textures) is reflects
+        with Image.open(io.BytesIO(base64.b64decode(png.partition(",")[2]))) as image:
+            shown = np.asarray(image.convert("RGB")).astype(float)
+        apart = np.abs(shown - expected).max(axis=2)
+        alike = {name for name, part in parts.items() if apart[part].max() <= 3}
+        assert alike == (parts.keys() if reflects else set())

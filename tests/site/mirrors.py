@@ -9,12 +9,23 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from strips import BASE, EXPOSURE, LEFT, RIGHT, Z, developed, glb, lit_site, row_of
 
 from ptmtools.scene.colors import luminance, to_linear, to_srgb
 from ptmtools.site.content import Site
 from ptmtools.site.entry import SiteEntry
 from ptmtools.texture import EncodeOptions, encode
+from tests.site.strips import (
+    BASE,
+    EXPOSURE,
+    LEFT,
+    RIGHT,
+    Z,
+    changed,
+    developed,
+    glb,
+    lit_site,
+    row_of,
+)
 
 Floats = NDArray[np.float64]
 
@@ -86,6 +97,12 @@ def mirror_site(plain: Site, probe: bool = True) -> Site:
         place = f"data/{name}.ptm"
         entries[place] = SiteEntry(place, texels, "application/octet-stream")
     document = json.loads(json.dumps(site.index))
+    for cell in document["cells"]:
+        place = f"data/{cell['record']}"
+        record = json.loads(entries[place].read())
+        for textures in record["textures"]:
+            textures += [first, first + 1]
+        entries[place] = changed(entries[place], record)
     place = f"data/{document['cells'][0]['geometry']}"
     materials = materials_of(first - 3, first + 1, first)
     for material in materials.values() if not probe else ():
@@ -149,10 +166,15 @@ def split_sum(rough: float, facing: Floats) -> tuple[Floats, Floats]:
 
 
 def mirrors_of(
-    angle: float, eye: tuple[float, float, float], size: tuple[int, int], arrives: bool = True
+    angle: float,
+    eye: tuple[float, float, float],
+    size: tuple[int, int],
+    arrives: bool = True,
+    shaded: bool = True,
 ) -> tuple[Floats, dict[str, NDArray[np.bool_]]]:
     """As `strips.view_of`: of the strips, at the exposure of the first cell. Glass is in "bright"
-    and "dark". Until the probe ``arrives`` its mean is reflected."""
+    and "dark". Until the probe ``arrives`` its mean is reflected. ``shaded``: whether what is unlit
+    is shaded by its angle."""
     width, height = size
     image = panorama() if arrives else None
     y, x = np.mgrid[0:height, 0:width]
@@ -187,7 +209,7 @@ def mirrors_of(
         matt = base * light * (1 - metallic) * (1 - share.max(axis=-1, keepdims=True))
         return developed(EXPOSURE[0] * (matt + reflection * share), "neutral")
 
-    facing = (0.7 + 0.3 * view[..., 2])[..., None]
+    facing = (0.7 + 0.3 * view[..., 2])[..., None] if shaded else 1.0
     reflection, scale, bias = seen(flat, POLISH["glass"][1])
     share = 0.04 * scale + bias
     share = share * (1 + 0.9 * (1 - share))

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from browser import Visitor, hurried, new_page, visiting_in
 from engines import PACKAGES, Engine, visiting_by
-from mirrors import mirror_site, mirrors_of
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -25,6 +24,7 @@ from ptmtools.site.content import Site, site_of
 from ptmtools.site.entry import SiteEntry
 from ptmtools.site.pictures import pictures
 from tests.site.conftest import PLAIN, Visiting
+from tests.site.mirrors import mirror_site, mirrors_of
 from tests.site.strips import EXPOSURE, EYES, lit_site, view_of
 from tests.systems.apo.statues import write_rooms
 

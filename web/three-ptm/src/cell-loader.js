@@ -5,7 +5,7 @@ import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture }
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 import { loadViewDecoder } from "ptm-decoder";
-import { illuminate } from "./light.js";
+import { glaze, illuminate } from "./light.js";
 import { bump, relieve } from "./relief.js";
 
 /** @typedef {import("three").Group} Group */
@@ -17,6 +17,7 @@ import { bump, relieve } from "./relief.js";
 
 /** @typedef {import("./light.js").Light} Light */
 /** @typedef {import("./light.js").Exposure} Exposure */
+/** @typedef {import("./light.js").Mirrored} Mirrored */
 
 const CLAMP = 33071;
 /** The light of buildings, as builds write it. @type {Light} */
@@ -53,6 +54,7 @@ function loaderOfGeometry() {
 /** Loads cells whose surfaces show the textures of `textureOf`. */
 export class CellLoader {
   #textureOf;
+  #probeOf;
   #light;
   #exposure;
   #loader = loaderOfGeometry();
@@ -61,9 +63,12 @@ export class CellLoader {
    * @param {TextureOf} textureOf
    * @param {Light} [light] of the index
    * @param {Exposure} [exposure] that lit surfaces share
+   * @param {(texture: number) => Omit<Mirrored, "metallic" | "roughness"> | null} [probeOf] returns the probe with a
+   *   number in the index; without it nothing reflects
    */
-  constructor(textureOf, light = LIGHT, exposure = { value: 1 }) {
+  constructor(textureOf, light = LIGHT, exposure = { value: 1 }, probeOf = () => null) {
     this.#textureOf = textureOf;
+    this.#probeOf = probeOf;
     this.#light = light;
     this.#exposure = exposure;
   }
@@ -92,8 +97,8 @@ export class CellLoader {
   }
 
   /** @param {import("three").Material} material the loader's, with the extras as `userData` */
-  #look({ color, opacity, transparent, alphaTest, vertexColors, side, userData }) {
-    const { texture, wrapS, wrapT, mesh, light, white, normal } = userData;
+  #look({ color, opacity, transparent, alphaTest, vertexColors, side, metalness, roughness, userData }) {
+    const { texture, wrapS, wrapT, mesh, light, white, normal, probe } = userData;
     const wrap = (/** @type {number | undefined} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
     const lightMap = light === undefined ? null : this.#textureOf(light, ClampToEdgeWrapping, ClampToEdgeWrapping);
@@ -107,7 +112,10 @@ export class CellLoader {
     } else if (normal !== undefined) {
       relieve(look, this.#textureOf(normal, ClampToEdgeWrapping, ClampToEdgeWrapping));
     }
-    if (white) illuminate(look, white, this.#light, this.#exposure);
+    const seen = probe === undefined || this.#light.tone === "plain" ? null : this.#probeOf(probe);
+    const mirrored = seen && { ...seen, metallic: metalness, roughness };
+    if (white) illuminate(look, white, this.#light, this.#exposure, mirrored);
+    else if (mirrored && transparent && !map) glaze(look, this.#light, this.#exposure, mirrored);
     return look;
   }
 }

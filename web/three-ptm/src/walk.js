@@ -1,7 +1,7 @@
 // A walk through a database: shows the cells that the hints of the viewer's cell list as visible
 // (docs/formats/hints.md).
 
-import { Group } from "three";
+import { ClampToEdgeWrapping, Group } from "three";
 import { Locator, levelSizes } from "ptm-client";
 import { DecoderWorkers } from "ptm-decoder";
 import { shareOut } from "./budget.js";
@@ -22,7 +22,7 @@ import { RangeFile } from "./range-file.js";
  * @property {{file: string, width: number, height: number, ends: number[], color?: number[],
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
  *   height: number, bytes: number, exact?: boolean}[], light?: number, relief?: string,
- *   normals?: boolean}[]} textures
+ *   normals?: boolean, probe?: import("./light.js").Probe}[]} textures
  * @property {{name: string, box: number[], record?: string, geometry?: string, exposure?: number}[]} cells
  * @property {import("./light.js").Light} [light]
  * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
@@ -44,6 +44,7 @@ import { RangeFile } from "./range-file.js";
  * @property {number} [budget] texture memory, bytes; 256 MiB
  * @property {number} [connections] requests at a time; 4, as browsers open six over HTTP/1.1
  * @property {DecoderWorkers} [workers] that decode; its own, unless given
+ * @property {boolean} [reflections] false: nothing reflects, and no probes are loaded
  * @property {(error: unknown) => void} [onError] called for a file that cannot be loaded
  */
 
@@ -117,7 +118,8 @@ export class Walk {
     this.budget = options.budget ?? 2 ** 28;
     /** Sky and ground of a building with light, to be added to a scene; or null. */
     this.surroundings = index.light ? surroundingsOf(index.light, this.#exposure) : null;
-    this.#loader = new CellLoader((...which) => this.#texture(...which), index.light, this.#exposure);
+    const probeOf = (/** @type {number} */ number) => (options.reflections === false ? null : this.#probe(number));
+    this.#loader = new CellLoader((...which) => this.#texture(...which), index.light, this.#exposure, probeOf);
     this.#locator = new Locator(index.cells.map(({ box }) => box));
     this.#renderer = renderer;
     this.#url = new URL(url, globalThis.document?.baseURI);
@@ -351,7 +353,7 @@ export class Walk {
   #texture(number, wrapS, wrapT, beside) {
     if (beside !== undefined) this.#beside.set(number, (this.#beside.get(number) ?? new Set()).add(beside));
     const row = this.index.textures[number], { file, ends, color, components, offsets } = row;
-    const light = row.light !== undefined;
+    const light = row.light !== undefined, probe = row.probe !== undefined;
     const slot = this.#textures.get(number) ?? {
       file: new RangeFile(new URL(file, this.#url)),
       copies: new Map(),
@@ -360,12 +362,19 @@ export class Walk {
     const workers = this.#options.workers ?? this.#ownWorkers;
     const previews = row.previews?.map((one) => ({ ...one, file: new URL(one.file, this.#url) }));
     const sizes = levelSizes(row);
-    const linear = light || row.relief !== undefined || beside !== undefined, channel = +light;
+    const linear = light || probe || row.relief !== undefined || beside !== undefined, channel = +light;
     const options = { workers, ends, color, components, offsets, previews, sizes, wrapS, wrapT, linear, channel };
     const texture =
       slot.copies.get(`${wrapS} ${wrapT}`) ?? new PtmTexture(this.#renderer, slot.file, options);
     slot.copies.set(`${wrapS} ${wrapT}`, texture);
     return texture;
+  }
+
+  /** @param {number} number of a texture */
+  #probe(number) {
+    const row = this.index.textures[number], { probe, color = [255, 255, 255] } = row;
+    const texture = probe && this.#texture(number, ClampToEdgeWrapping, ClampToEdgeWrapping);
+    return texture ? { probe, texture, color, levels: levelSizes(row).length } : null;
   }
 
   /**
@@ -387,15 +396,15 @@ export class Walk {
 
   /**
    * Textures with too many levels shrink before any grows; then all get coarse levels; then the rest by
-   * previews; then exactly. The greatest coverage begins.
+   * previews; then exactly. The greatest coverage begins. Probes have all levels or none.
    * @param {Map<number, number>} shares
    * @param {AbortSignal} signal
    */
   async #refine(shares, signal) {
     const wants = [...this.#textures].map(([number, { copies }]) => {
-      const sizes = levelSizes(this.index.textures[number]);
+      const row = this.index.textures[number], sizes = levelSizes(row), whole = row.probe !== undefined;
       const share = shares.get(number) ?? 0;
-      return { sizes, share, copies: copies.size, all: [...copies.values()] };
+      return { sizes, share, whole, copies: copies.size, all: [...copies.values()] };
     });
     const levels = shareOut(wants, this.budget);
     const order = [...wants.keys()].sort((a, b) => wants[b].share - wants[a].share);
@@ -404,7 +413,10 @@ export class Walk {
       this.#all(
         order.map((n) => async () => {
           // One after the other: the second uses the bytes of the first.
-          for (const texture of wants[n].all) await texture.refine(target(n, texture.level), { exact });
+          for (const texture of wants[n].all) {
+            const level = target(n, texture.level), { whole, sizes } = wants[n];
+            await texture.refine(whole && level < sizes.length - 1 ? -1 : level, { exact });
+          }
         }),
         signal,
       );

@@ -62,6 +62,9 @@ export class Material {
   vertexColors: boolean;
   side: number;
   toneMapped: boolean;
+  premultipliedAlpha: boolean;
+  metalness: number;
+  roughness: number;
   userData: {
     texture?: number;
     wrapS?: number;
@@ -69,6 +72,7 @@ export class Material {
     mesh?: number;
     light?: number;
     white?: number;
+    probe?: number;
     normal?: number;
     normalCoords?: number;
     normalScale?: number;
