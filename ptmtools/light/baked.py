@@ -124,7 +124,7 @@ class BakedSurfaces:
         rows = np.flatnonzero(kind == _CORNERS)
         light[rows] = np.einsum("nk,nkc->nc", share[rows], self.light[piece[rows]])
         rows = np.flatnonzero(kind == _MAPPED)
-        light[rows] = self._mapped(piece[rows], share[rows])
+        light[rows] = self._map_light(piece[rows], share[rows])
         colors = self.tint[face]
         textured = np.flatnonzero(self.image[face] >= 0)
         across, along = u[textured, None], v[textured, None]
@@ -134,7 +134,7 @@ class BakedSurfaces:
         )
         return np.asarray(colors * light + np.where(front[:, None], self.glow[face], 0.0))
 
-    def _mapped(self, piece: Ints, share: Floats) -> Floats:
+    def _map_light(self, piece: Ints, share: Floats) -> Floats:
         """(n, 3) the light of the nearest texels of lightmaps."""
         cell, at = self.cell[piece], np.einsum("nk,nkx->nx", share, self.uv[piece])
         size = self.width[cell]

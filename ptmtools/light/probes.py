@@ -98,9 +98,9 @@ class ProbeBaking:
         mean = max(mean, white * 2.0**-STOPS)
         image = np.full((*PROBE_SIZE[::-1], 3), 255, np.uint8)
         image[:] = light_codes(light.mean(axis=0), white)
-        for (left, top, side), texels in zip(PROBE_MAPS, maps, strict=True):
+        for (column, row, side), texels in zip(PROBE_MAPS, maps, strict=True):
             codes = light_codes(texels.reshape(side - 2, side - 2, 3), white)
-            image[top : top + side, left : left + side] = with_border(codes)
+            image[row : row + side, column : column + side] = with_border(codes)
         return Probe(image, white, mean, centre, low, high)
 
     def _most_open(self, candidates: Floats) -> Floats:
@@ -251,8 +251,8 @@ def with_border(codes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _box(point: Floats, way: Floats, distance: Floats) -> tuple[Floats, Floats]:
     """(3,) and (3,) the corners of the box that most rays end on: the median of those that leave
     through each side of a cube. A side that nothing is on is as far as the farthest surface."""
-    far = distance[np.isfinite(distance)].max(initial=1.0)
-    end = way * np.minimum(distance, far)[:, None]
+    farthest = distance[np.isfinite(distance)].max(initial=1.0)
+    end = way * np.minimum(distance, farthest)[:, None]
     axis = np.abs(way).argmax(axis=1)
     sides = np.array(
         [

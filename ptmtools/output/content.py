@@ -123,7 +123,7 @@ class Content:
             return {}
         lamps = [k for k, m in enumerate(materials) if m.image < 0 and m.opacity == 1]
         lamps = [k for k in lamps if light.shine[k].any()]
-        whites = significant(np.array([_shown(materials[k], light.shine[k]).max() for k in lamps]))
+        whites = significant(np.array([_lamp_radiance(materials[k], light.shine[k]).max() for k in lamps]))
         return {k: white or 1.0 for k, white in zip(lamps, whites, strict=True)}
 
     @cached_property
@@ -132,7 +132,7 @@ class Content:
         materials, light = list(self.scene.materials), self.extras.light
         for k, white in self.lamp_whites.items():
             assert light
-            shares = np.minimum(_shown(materials[k], light.shine[k]) / white, 1)
+            shares = np.minimum(_lamp_radiance(materials[k], light.shine[k]) / white, 1)
             red, green, blue = to_srgb(shares).tolist()
             materials[k] = replace(materials[k], color=(red, green, blue))
         return tuple(materials)
@@ -201,6 +201,6 @@ class Content:
         return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]
 
 
-def _shown(material: Material, shine: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lamp_radiance(material: Material, shine: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) the radiance of a lamp: that which it sends, but no less than its colour."""
     return np.maximum(to_linear(np.array(material.color)), shine)

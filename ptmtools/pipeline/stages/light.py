@@ -27,7 +27,7 @@ from ptmtools.pipeline.encoding import (
 )
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.probes import LitSurfaces, bake_probes, reflective_shapes
+from ptmtools.pipeline.stages.probes import BakedBuilding, bake_probes, reflective_shapes
 from ptmtools.pipeline.stages.scene import (
     SCENE,
     image_bytes,
@@ -298,7 +298,7 @@ def _light_of(
         reflects = reflective_shapes(scene, geometry, unlit[run[CELLS].triangle_source[first]])
         of_cells = np.split(reflects, geometry.cell_start[1:-1])
         chosen = [cell for cell, shapes in enumerate(of_cells) if shapes.any()]
-        surfaces = LitSurfaces(building, pieces, lights, _tint(scene), 1 / factor)
+        surfaces = BakedBuilding(building, pieces, lights, _tint(scene), 1 / factor)
         probes, probe_bytes = bake_probes(run, transaction, surfaces, chosen)
         probes[:, :2] *= factor
     light = Light(

@@ -85,7 +85,7 @@ def reflective_shapes(
 
 
 @dataclass(frozen=True)
-class LitSurfaces:
+class BakedBuilding:
     """Lit surfaces that probes see.
 
     Attributes
@@ -103,7 +103,7 @@ class LitSurfaces:
 
 
 def bake_probes(
-    run: Run, transaction: Transaction, lit: LitSurfaces, chosen: Sequence[int]
+    run: Run, transaction: Transaction, lit: BakedBuilding, chosen: Sequence[int]
 ) -> tuple[NDArray[np.float64], int]:
     """(C, 11) the probes of the chosen cells, as `Light.probe`, and their bytes."""
     import numpy as np
