@@ -83,12 +83,6 @@ def corner_values(
     return result
 
 
-def surface_points(sight: Sight, pixel: Ints, triangles: Triangles) -> Floats:
-    """(n, 3) world points of the triangles that some pixels show, metres."""
-    at = _intersections(sight, pixel, triangles)[2]
-    return np.asarray(at + triangles.corner[sight.triangle[pixel], 0])
-
-
 def _interpolate(
     sight: Sight, pixel: Ints, triangles: Triangles, values: NDArray[np.floating]
 ) -> Floats:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints, units
 from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE
 from ptmtools.output.surfaces import Surfaces
-from ptmtools.rendering.footprints import corner_values, surface_points
+from ptmtools.rendering.footprints import corner_values
 from ptmtools.rendering.records import Sight, Triangles
 from ptmtools.scene.colors import luminance
 
@@ -167,6 +167,9 @@ class Reflections:
         gloss = surfaces.gloss
         assert gloss is not None
         self.probe, self._triangles, self._normals = gloss.probe, triangles, surfaces.normals
+        #: (T, 3) unit normals of the faces, and (T,) the distances of their planes from the origin.
+        self._normal = units(triangles.normal)
+        self._plane = np.einsum("ij,ij->i", self._normal, triangles.corner[:, 0])
         if surfaces.normals is not None:
             self._curved = np.asarray(surfaces.normals.any(axis=(1, 2)))
         self._rows, self._stops = index["textures"], float(index["light"]["stops"])
@@ -179,8 +182,9 @@ class Reflections:
 
     def probes(self, triangle: Ints, images: Images) -> dict[int, Panorama]:
         """Those of (n,) triangles, -1 for none, by number."""
-        numbers = _members(np.where(triangle >= 0, self.probe[triangle], -1))
-        return {n: self._read(n, images(n)) for n in numbers}
+        shown = np.zeros(len(self.probe) + 1, np.bool_)
+        shown[triangle] = True
+        return {n: self._read(n, images(n)) for n in _members(self.probe[shown[:-1]])}
 
     def light_up(
         self, sight: Sight, pixel: Ints, probes: Mapping[int, Panorama], base: Floats, light: Floats
@@ -222,15 +226,18 @@ class Reflections:
     def _facings(self, sight: Sight, pixel: Ints) -> tuple[Floats, Floats, Floats, Floats]:
         """(n, 3) points that some pixels show, unit vectors to the eye, unit normals of any side,
         and (n,) cosines between the eye and those that are turned to it."""
-        triangle, view = sight.triangle[pixel], units(-sight.ray[pixel])
-        normal = self._triangles.normal[triangle]
+        triangle, ray = sight.triangle[pixel], sight.ray[pixel]
+        normal = self._normal[triangle]
+        along = np.einsum("ij,ij->i", normal, ray)
+        along[along == 0] = _NONE
+        at = sight.eye + ray * ((self._plane[triangle] - normal @ sight.eye) / along)[:, None]
         if self._normals is not None:
             curved = np.flatnonzero(self._curved[triangle])
-            normal[curved] = corner_values(sight, pixel[curved], self._triangles, self._normals)
-        normal = units(normal)
-        facing = np.einsum("ij,ij->i", normal, view)
-        at = surface_points(sight, pixel, self._triangles)
-        return at, view, normal, np.maximum(np.abs(facing), _GRAZING)
+            between = corner_values(sight, pixel[curved], self._triangles, self._normals)
+            normal[curved] = units(between)
+        view = ray / -np.sqrt(np.einsum("ij,ij->i", ray, ray))[:, None]
+        facing = np.abs(np.einsum("ij,ij->i", normal, view))
+        return at, view, normal, np.maximum(facing, _GRAZING)
 
     def _read(self, number: int, image: NDArray[np.uint8] | None) -> Panorama:
         row = self._rows[number]
