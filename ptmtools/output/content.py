@@ -123,7 +123,8 @@ class Content:
             return {}
         lamps = [k for k, m in enumerate(materials) if m.image < 0 and m.opacity == 1]
         lamps = [k for k in lamps if light.shine[k].any()]
-        whites = significant(np.array([_lamp_radiance(materials[k], light.shine[k]).max() for k in lamps]))
+        peaks = [_lamp_radiance(materials[k], light.shine[k]).max() for k in lamps]
+        whites = significant(np.array(peaks))
         return {k: white or 1.0 for k, white in zip(lamps, whites, strict=True)}
 
     @cached_property
