@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools import arrays
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import kernel
 from ptmtools.light.baked import BakedSurfaces
@@ -37,12 +38,14 @@ if TYPE_CHECKING:
 #: Rays for each texel of the sharpest map.
 _RAYS = 4
 #: White is at most this multiple of the median: brighter texels, lamps, would take all stops.
-_BRIGHTEST = 64.0
+_BRIGHTEST = 256.0
 #: Height of a viewer's eyes, metres; candidates for the centre along each axis of the cell.
 _EYES, _GRID = 1.6, 5
-#: The root of the rays from a candidate, metres beyond which surfaces are far enough, and how much
-#: rays count that end at the backs of walls.
-_FEW, _FAR, _OF_BACKS = 8, 10.0, 4.0
+#: Rays from a candidate, metres beyond which surfaces are far enough, and how much rays count that
+#: end at the backs of walls.
+_FEW, _FAR, _OF_BACKS = 32, 10.0, 4.0
+#: Least cosine of a surface to a side of the box that it counts for.
+_PARALLEL = 0.9
 #: The least distance from the centre to a side of the box, metres.
 _NEAREST = 0.1
 
@@ -86,8 +89,8 @@ class ProbeBaking:
         """The probe at the best of (n, 3) points."""
         centre = self._most_open(candidates)
         way, solid = directions(PROBE_MAPS[0][2] - 2, _RAYS)
-        seen, distance = self._look(centre, way)
-        low, high = _box(centre, way, distance)
+        seen, hit = self._look(centre, way)
+        low, high = _box(centre, way, hit)
         light = seen.reshape(-1, _RAYS, 3).mean(axis=1)
         light += self._lamps(centre, way.reshape(-1, _RAYS, 3).mean(axis=1), solid)
         mean = float((luminance(light) * solid).sum() / solid.sum())
@@ -104,14 +107,16 @@ class ProbeBaking:
         return Probe(image, white, mean, centre, low, high)
 
     def _most_open(self, candidates: Floats) -> Floats:
-        """The candidate whose rays are the longest, of which few end at the backs of walls."""
-        way, _ = directions(_FEW, 1)
+        """The candidate farthest from walls: with the longest quarter of level rays, of which few
+        end at the backs of walls. (By the mean of all rays it would be in a doorway.)"""
+        angle = 2 * math.pi * np.arange(_FEW) / _FEW
+        way = np.stack([np.cos(angle), np.zeros(_FEW), np.sin(angle)], axis=1)
         scores = []
         for point in candidates:
             hit = self._cast(point, way)
             shows = (hit.front | (hit.face < 0)).mean()
-            length = np.log(np.clip(hit.distance, _NEAREST, _FAR)).mean()
-            scores.append(length + _OF_BACKS * math.log(max(shows, 1e-3)))
+            length = np.quantile(np.clip(hit.distance, _NEAREST, _FAR), 0.25)
+            scores.append(math.log(length) + _OF_BACKS * math.log(max(shows, 1e-3)))
         return np.asarray(candidates[int(np.argmax(scores))])
 
     def _cast(self, point: Floats, way: Floats) -> _Hits:
@@ -119,7 +124,8 @@ class ProbeBaking:
         if around.tree is None:
             nothing = np.full(len(way), -1)
             zero = np.zeros(len(way))
-            return _Hits(nothing, zero, zero, np.full(len(way), np.inf), nothing > 0, nothing > 0)
+            never, none = np.full(len(way), np.inf), nothing > 0
+            return _Hits(nothing, zero, zero, never, none, none, np.zeros(way.shape))
         origin = np.tile((point - around.middle).astype(np.float32), (len(way), 1))
         hit = around.tree.run(origin, way.astype(np.float32), output=True)
         face = hit["primID"].astype(np.int64)
@@ -127,10 +133,11 @@ class ProbeBaking:
         back = np.einsum("nx,nx->n", hit["Ng"], way) > 0
         front = (face >= 0) & (first[face, back.astype(np.int64)] >= 0)
         distance = np.where(face >= 0, hit["tfar"].astype(np.float64), np.inf)
-        return _Hits(face, hit["u"], hit["v"], distance, front, back)
+        normal = arrays.units(hit["Ng"].astype(np.float64)) * np.where(back, -1, 1)[:, None]
+        return _Hits(face, hit["u"], hit["v"], distance, front, back, normal)
 
-    def _look(self, point: Floats, way: Floats) -> tuple[Floats, Floats]:
-        """(n, 3) what arrives from (n, 3) directions, and (n,) from how far."""
+    def _look(self, point: Floats, way: Floats) -> tuple[Floats, _Hits]:
+        """(n, 3) what arrives from (n, 3) directions, and what they meet."""
         hit, daylight = self._cast(point, way), self.building.field.daylight
         light = np.where(way[:, 1:2] >= 0, daylight.sky, daylight.ground)
         rows = np.flatnonzero(hit.face >= 0)
@@ -139,7 +146,7 @@ class ProbeBaking:
         a, b, c = np.moveaxis(self.corner[face], 1, 0)
         at = a + u[:, None] * (b - a) + v[:, None] * (c - a)
         light[rows] = self.surfaces.radiance(self.faces[face], u, v, at, ~hit.back[rows])
-        return light, hit.distance
+        return light, hit
 
     def _lamps(self, point: Floats, way: Floats, solid: Floats) -> Floats:
         """(n, 3) what lamps without a surface add to the texels in (n, 3) directions, of (n,)
@@ -162,7 +169,7 @@ class ProbeBaking:
 @dataclass(frozen=True)
 class _Hits:
     """What n rays meet: (n,) faces, -1 for none, barycentric coordinates, metres, whether the side
-    is one that shows, and whether it is the back."""
+    is one that shows, and whether it is the back; (n, 3) normals of that side."""
 
     face: Ints
     u: NDArray[np.floating[Any]]
@@ -170,6 +177,7 @@ class _Hits:
     distance: Floats
     front: Bools
     back: Bools
+    normal: Floats
 
 
 @cache
@@ -248,20 +256,20 @@ def with_border(codes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return result
 
 
-def _box(point: Floats, way: Floats, distance: Floats) -> tuple[Floats, Floats]:
-    """(3,) and (3,) the corners of the box that most rays end on: the median of those that leave
-    through each side of a cube. A side that nothing is on is as far as the farthest surface."""
-    farthest = distance[np.isfinite(distance)].max(initial=1.0)
-    end = way * np.minimum(distance, farthest)[:, None]
-    axis = np.abs(way).argmax(axis=1)
-    sides = np.array(
-        [
-            [np.median(end[(axis == k) & (way[:, k] * sign > 0), k]) for k in range(3)]
-            for sign in (-1, 1)
-        ]
-    )
-    low = point + np.minimum(sides[0], -_NEAREST)
-    return low, point + np.maximum(sides[1], _NEAREST)
+def _box(point: Floats, way: Floats, hit: _Hits) -> tuple[Floats, Floats]:
+    """(3,) and (3,) the corners of a box around a point: each side is where most of the rays end
+    that meet a surface parallel to it. A side without is as far as the farthest surface."""
+    met = hit.face >= 0
+    end, normal = (way * np.where(met, hit.distance, 0)[:, None])[met], hit.normal[met]
+    farthest = hit.distance[met].max(initial=1.0)
+    sides = np.zeros((2, 3))
+    for axis in range(3):
+        for side, sign in enumerate((-1, 1)):
+            reached = sign * end[-sign * normal[:, axis] > _PARALLEL, axis]
+            reached = reached[reached > 0]
+            sides[side, axis] = np.median(reached) if len(reached) else farthest
+    sides = np.maximum(sides, _NEAREST)
+    return point - sides[0], point + sides[1]
 
 
 def candidates(cells: Cells, cell: int) -> Floats:
