@@ -334,7 +334,7 @@ return { pictures, exposures };
 """
 
 
-@pytest.mark.parametrize("tone", ["neutral", "plain"])
+@pytest.mark.parametrize("tone", ["neutral", "agx", "plain"])
 def test_three_js_follows_the_formula_of_light(
     three: Any, lit_rooms: Path, tmp_path: Path, tone: str
 ) -> None:

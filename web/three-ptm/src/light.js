@@ -10,7 +10,7 @@ import { BufferAttribute, BufferGeometry, Mesh, ShaderMaterial } from "three";
  * The light of a building.
  * @typedef {object} Light
  * @property {number} stops powers of two that the codes of lightmaps cover
- * @property {string} tone "neutral" or "plain"
+ * @property {string} tone "neutral", "agx" or "plain"
  * @property {number[]} [sky] radiance of the background, with "neutral"
  * @property {number[]} [ground]
  */
@@ -33,15 +33,28 @@ import { BufferAttribute, BufferGeometry, Mesh, ShaderMaterial } from "three";
 /** Seconds in which the exposure nearly reaches another one, and a share of it that does not show. */
 const EASE = 0.2, UNSEEN = 0.01;
 
-/** Linear light that a screen can show. @param {string} tone */
-const developed = (tone) => `
-vec3 developed(vec3 light) {
+/** The tone curves, Khronos PBR Neutral without its offset and AgX (docs/formats/hints.md#colours). @type {Record<string, string>} */
+const CURVES = {
+  plain: "",
+  neutral: `
   float most = max(light.r, max(light.g, light.b));
-  if (most > ${tone === "plain" ? "1e30" : "0.8"}) {
+  if (most > 0.8) {
     float peak = 1.0 - 0.04 / (most - 0.6);
     light = mix(light * (peak / most), vec3(peak), 1.0 - 1.0 / (0.15 * (most - peak) + 1.0));
-  }
-  return min(light, 1.0);
+  }`,
+  agx: `
+  light *= mat3(0.544815, 0.373787, 0.081384, 0.140417, 0.754152, 0.105431, 0.088811, 0.178876, 0.732313);
+  vec3 y = clamp(log2(max(light, 1e-9)) / 16.5 + 0.755995, 0.0, 1.0);
+  light = (((((15.5 * y - 40.14) * y + 31.96) * y - 6.868) * y + 0.4298) * y + 0.1191) * y - 0.00232;
+  light *= mat3(1.127101, -0.110607, -0.016494, -0.14133, 1.157824, -0.016494, -0.14133, -0.110607, 1.251936);
+  light = pow(max(light, 0.0), vec3(2.2));
+  light *= mat3(1.660491, -0.587641, -0.07285, -0.12455, 1.1329, -0.008349, -0.018151, -0.100579, 1.11873);`,
+};
+
+/** Linear light that a screen can show. @param {string} tone */
+const developed = (tone) => `
+vec3 developed(vec3 light) {${CURVES[tone] ?? CURVES.neutral}
+  return clamp(light, 0.0, 1.0);
 }
 `;
 
