@@ -29,12 +29,12 @@ def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats,
     normal, gradient = triangles.normal[which], triangles.gradient[which]
     offset = triangles.corner[which, 0] - sight.eye
 
-    def along(vectors: Floats) -> Floats:
+    def project(vectors: Floats) -> Floats:
         """(n,) products of (t, 3) vectors of the triangles and the rays."""
         a, b, c = (part.take(row) for part in vectors.T)
         return np.asarray(a * x + b * y + c * z)
 
-    facing = along(normal)
+    facing = project(normal)
     facing[facing == 0] = _EDGE_ON
     depth = np.einsum("ij,ij->i", normal, offset).take(row) / facing
     slope = [part.take(row) / facing for part in (normal @ sight.axes.T).T]
@@ -42,7 +42,7 @@ def footprints(sight: Sight, pixel: Ints, triangles: Triangles) -> tuple[Floats,
     size = np.abs(depth) * sight.pixel
     for k in range(2):
         start = triangles.uv[which, 0, k] - np.einsum("ij,ij->i", gradient[:, k], offset)
-        growth, turns = along(gradient[:, k]), gradient[:, k] @ sight.axes.T
+        growth, turns = project(gradient[:, k]), gradient[:, k] @ sight.axes.T
         uv[:, k] = start.take(row) + growth * depth
         for c in range(2):
             moves[:, k, c] = (turns[:, c].take(row) - slope[c] * growth) * size
