@@ -85,7 +85,7 @@ class BakedSurfaces:
         glass = np.concatenate([surfaces.glass for surfaces in pieces])
         dense = np.concatenate([surfaces.dense for surfaces in pieces])
         shares = to_linear(np.concatenate([light.vertex for light in lights]) / 255)
-        maps = [np.zeros((0, 0, 3), np.uint8) if k.texels is None else k.texels for k in lights]
+        maps = [np.zeros((0, 0, 3)) if k.texels is None else np.rint(k.texels) for k in lights]
         sizes = np.array([len(texels) for texels in maps])
         colors = [to_linear(texels / 255).astype(np.float32).reshape(-1, 3) for texels in images]
         image = np.array([material.image for material in scene.materials], np.int64)
@@ -98,7 +98,7 @@ class BakedSurfaces:
             np.where(glass, _UNLIT, np.where(dense, _CORNERS, _MAPPED)).astype(np.uint8),
             np.concatenate([surfaces.side for surfaces in pieces]),
             cell,
-            np.concatenate([texels.reshape(-1, 3) for texels in maps]),
+            np.concatenate([texels.reshape(-1, 3) for texels in maps]).astype(np.uint8),
             _starts(sizes**2),
             sizes,
             white,

@@ -75,7 +75,7 @@ class CellLight:
     Attributes
     ----------
     white: the light of which texels and `vertex` are shares.
-    texels: (side, side, 3) uint8 codes; None without a lightmap.
+    texels: (side, side, 3) codes, see `light_codes`; None without a lightmap.
     exposure: the factor with which it shows by itself, see `_exposure`, and the area of its lit
         surfaces, m².
     crowded: whether neighbours in the lightmap run into each other.
@@ -87,7 +87,7 @@ class CellLight:
     uv: NDArray[np.float32]
     vertex: NDArray[np.uint8]
     white: float
-    texels: NDArray[np.uint8] | None
+    texels: Singles | None
     exposure: tuple[float, float]
     crowded: bool
     density: float = 1.0

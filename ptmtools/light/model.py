@@ -45,14 +45,14 @@ PROBE_SIZE = 192, 128
 PROBE_MAPS = ((0, 0, 128), (128, 0, 64), (128, 64, 32), (160, 64, 16))
 
 
-def light_codes(light: Floats | Singles, white: float) -> NDArray[np.uint8]:
-    """Light of any shape as codes, of 255: white is 255, and half of it 255 / `STOPS` less."""
+def light_codes(light: Floats | Singles, white: float) -> Singles:
+    """Light of any shape as codes, 0 to 255, not rounded: white is 255, and half of it 255 /
+    `STOPS` less."""
     share = np.maximum(light / white, 2.0**-STOPS)
-    code = np.clip(1 + np.log2(share) / STOPS, 0, 1)
-    return np.asarray(np.rint(255 * code), np.uint8)
+    return np.asarray(255 * np.clip(1 + np.log2(share) / STOPS, 0, 1), np.float32)
 
 
-def coded_light(code: NDArray[np.uint8] | Floats, white: float) -> Floats:
+def coded_light(code: NDArray[np.uint8] | Floats | Singles, white: float) -> Floats:
     """The inverse of `light_codes`; codes between whole numbers may be means of some."""
     return np.asarray(white * 2.0 ** (STOPS * (np.asarray(code, np.float64) / 255 - 1)))
 

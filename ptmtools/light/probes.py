@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import arrays
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.jit import kernel
 from ptmtools.light.baked import BakedSurfaces
 from ptmtools.light.building import BuildingLight
@@ -61,7 +61,7 @@ class Probe:
     centre, low, high: (3,) metres, the point, and the corners of the box.
     """
 
-    texels: NDArray[np.uint8]
+    texels: Singles
     white: float
     mean: float
     centre: Floats
@@ -99,7 +99,7 @@ class ProbeBaking:
         white = max(texels.max() for texels in maps)
         white = float(f"{min(white, _BRIGHTEST * middle) if middle > 0 else white:.3g}") or 1.0
         mean = max(mean, white * 2.0**-STOPS)
-        image = np.full((*PROBE_SIZE[::-1], 3), 255, np.uint8)
+        image = np.empty((*PROBE_SIZE[::-1], 3), np.float32)
         image[:] = light_codes(light.mean(axis=0), white)
         for (column, row, side), texels in zip(PROBE_MAPS, maps, strict=True):
             codes = light_codes(texels.reshape(side - 2, side - 2, 3), white)
@@ -245,10 +245,10 @@ def filter_lobe(
     return result
 
 
-def with_border(codes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def with_border(codes: Singles) -> Singles:
     """A map with a border of a texel, which repeats those on the other side of an edge."""
     side = len(codes)
-    result = np.empty((side + 2, side + 2, 3), np.uint8)
+    result = np.empty((side + 2, side + 2, 3), codes.dtype)
     result[1:-1, 1:-1] = codes
     result[0, 1:-1], result[-1, 1:-1] = codes[0, ::-1], codes[-1, ::-1]
     result[1:-1, 0], result[1:-1, -1] = codes[::-1, 0], codes[::-1, -1]

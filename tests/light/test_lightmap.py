@@ -11,7 +11,9 @@ from ptmtools.light.atlas import unwrap
 from ptmtools.light.lightmap import TexelGrid, fill, vertex_light
 from ptmtools.light.looks import LightImage, PaintedLight
 from ptmtools.light.occlusion import normals
+from ptmtools.pipeline.encoding import lossy_codes
 from ptmtools.scene.source import SourceWrap
+from ptmtools.texture.previews import decode_preview
 from tests.light.shapes import GROUND, indexed, triangles_of
 from tests.systems.campus.models import level
 
@@ -138,3 +140,15 @@ def test_a_weaker_light_is_nearer_to_white() -> None:
     look = PaintedLight(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
     actual = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
     assert actual[0, 0] == pytest.approx(0.75)
+
+
+def test_images_of_codes_keep_their_tint() -> None:
+    """Encoders round differences of colour down."""
+    tint = np.array([1.2, 0.0, -1.4])
+    ramp = np.linspace(90, 200, 96)[:, None, None] + np.linspace(0, 9, 96)[None, :, None]
+    codes = (ramp + tint).astype(np.float32)
+    name, data = lossy_codes(codes, {"avif": 85, "webp": 90})
+    assert name in ("avif", "webp")
+    shown = decode_preview(data, 3).astype(float)
+    assert np.abs((shown - codes).mean(axis=(0, 1))).max() < 0.4
+    assert np.abs(shown - codes).max() < 8
