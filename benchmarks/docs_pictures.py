@@ -12,6 +12,7 @@ door-*.png   two rooms with a door leaf in the doorway; a closed door makes one 
 interlace.jpg  two paintings at an eighth and a quarter of their sides: means of texels (a level of
              the `.ptm`) beside the texels of the first interlaced files, with bytes and PSNR
 light.jpg    the same view with `--light none` and with light, as `ptm render` draws it
+gloss.jpg    two rooms of the sample lit-hall likewise, whose floors and metals reflect
 apo.jpg      a bust as modelled, simplified, and with some levels of its octree
 """
 
@@ -55,6 +56,8 @@ CELL, VIEWPOINT = 9, 5
 PAINTING, LEVELS, SIDE = "painting_09", (4, 6, 8, 10), 240
 #: The viewpoint without and with light.
 LIT = 2
+#: Eyes and points to look at in the lit hall.
+GLOSSY = (((4.0, 1.7, 3.2), (-1.5, 1.3, -3.5)), ((-6.5, 1.7, 2.5), (-13.2, 1.5, -3.0)))
 #: The coarse picture has textures of 2⁵ texels a side.
 COARSE, WIDTH, HEIGHT = 5, 480, 340
 #: A door leaf that fills the doorway of the two rooms, as a line to add to the OBJ file.
@@ -234,6 +237,16 @@ def lit(database: Path) -> Image.Image:
     return Image.fromarray(np.concatenate(pictures, axis=1))
 
 
+def glossy() -> Image.Image:
+    """Two rooms of the lit hall side by side."""
+    with tempfile.TemporaryDirectory() as folder:
+        ptm("sample", "lit-hall", "-o", f"{folder}/hall")
+        ptm("build-scene", f"{folder}/hall/lit_hall.glb", "-o", f"{folder}/hall.db")
+        served = read_served(f"{folder}/hall.db")
+        views = (ViewOptions(eye=a, look=b, width=WIDTH, height=HEIGHT) for a, b in GLOSSY)
+        return Image.fromarray(np.concatenate([draw_view(served, v) for v in views], axis=1))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("database", type=Path, help="of the sample museum")
@@ -245,6 +258,7 @@ def main() -> None:
     views(database).save(PICTURES / "view.jpg", quality=85)
     walk(database).save(PICTURES / "walk.jpg", quality=85)
     lit(database).save(PICTURES / "light.jpg", quality=85)
+    glossy().save(PICTURES / "gloss.jpg", quality=85)
     interlaced(ROOT / "build/museum/textures").save(PICTURES / "interlace.jpg", quality=80)
     octree_levels().save(PICTURES / "apo.jpg", quality=88)
     with tempfile.TemporaryDirectory() as folder:
