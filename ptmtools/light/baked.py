@@ -38,7 +38,8 @@ class BakedSurfaces:
     kind, side, cell: (P,).
     texels, first, width: (n, 3) codes of all lightmaps; (C,) the first of each cell, and its side.
     white: (C,).
-    tint, glow: (T, 3) base colours beside images, and what faces send by themselves.
+    tint, glow, both: (T, 3) base colours beside images, (T, 3) what faces send by themselves, and
+        (T,) whether from both sides.
     image, place: (T,) index of an image, -1 for none; (T, 3, 2) coordinates in it.
     colors, image_first, image_size: (n, 3) float32 linear texels of all images; (I,); (I, 2) width
         and height.
@@ -59,6 +60,7 @@ class BakedSurfaces:
     white: Floats
     tint: Floats
     glow: Floats
+    both: Bools
     image: Ints
     place: Floats
     colors: Singles
@@ -104,6 +106,7 @@ class BakedSurfaces:
             white,
             tint,
             glow,
+            scene.two_sided,
             image[scene.triangle_material],
             scene.uv,
             np.concatenate([np.zeros((0, 3), np.float32), *colors]),
@@ -132,7 +135,10 @@ class BakedSurfaces:
         colors[textured] *= self._texels(
             self.image[face[textured]], a + across * (b - a) + along * (c - a)
         )
-        return np.asarray(colors * light + np.where(front[:, None], self.glow[face], 0.0))
+        sent = colors * light
+        # Lamps with an image show that.
+        shows = (self.image[face] < 0) & (front | self.both[face])
+        return np.asarray(np.where(shows[:, None], np.maximum(sent, self.glow[face]), sent))
 
     def _map_light(self, piece: Ints, share: Floats) -> Floats:
         """(n, 3) the light of the nearest texels of lightmaps."""

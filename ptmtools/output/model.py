@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
-from ptmtools.light.model import PROBE_SIZE
 from ptmtools.options import degrees_text, option
 
 if TYPE_CHECKING:
@@ -119,6 +118,8 @@ def offsets_of(row: Mapping[str, Any]) -> list[int]:
 def probe_fault(row: Mapping[str, Any], cells: int) -> tuple[str, str]:
     """The member of a row of `textures` that is wrong for a probe, and a message; two empty texts
     if it is right, or no probe. ``cells``: their number."""
+    from ptmtools.light.model import PROBE_SIZE
+
     probe = row.get("probe")
     if probe is None:
         return "", ""
@@ -247,7 +248,8 @@ class WriterOptions:
     tone: Literal["neutral", "agx"] = option(
         "neutral",
         "Tone curve of buildings with baked light: neutral (colours stay those of the model up to "
-        "0.8 of white, as pictures want) or agx (softer contrast, as film; bright colours pale).",
+        "0.8 of white, as pictures want) or agx (softer contrast, as film; bright colours pale). "
+        "Without effect on light of the model, and without light.",
     )
     first_look: int = option(
         0,

@@ -177,11 +177,11 @@ class LitSurfaces:
         self.lightmaps: Triangles | None = None
         self.reflections: Reflections | None = None
         self.textures = [self.triangles.texture]
-        if not (lit := self._white > 0).any():
-            return
-        if surfaces.gloss and served.index["light"]["tone"] in CURVES:
+        if surfaces.gloss and served.index.get("light", {}).get("tone") in CURVES:
             self.reflections = Reflections(surfaces, self.triangles, served.index)
             self.textures.append(self.reflections.probe)
+        if not (lit := self._white > 0).any():
+            return
         if light := surfaces.light:
             self.lightmaps = triangles_of(light)
             self.textures.append(self.lightmaps.texture)
@@ -259,8 +259,11 @@ class LitSurfaces:
         color, alpha = shown * share, share
         if tone and self.reflections:
             alpha = share.copy()
-            probes = self.reflections.probes(sight.triangle, images)
-            for pixel, part, mirrored, behind in self.reflections.panes(sight, probes):
+            triangle = sight.triangle
+            panes = np.where(self._white[triangle] > 0, -1, triangle)
+            probes = self.reflections.probes(panes, images)
+            pane_sight = sight._replace(triangle=panes)
+            for pixel, part, mirrored, behind in self.reflections.panes(pane_sight, probes):
                 passed = 1 - part[:, None]
                 glare = tone.display(behind * passed + mirrored * part[:, None])
                 glare -= passed * tone.display(behind)
@@ -271,7 +274,7 @@ class LitSurfaces:
 
 def show_vertex_light(served: Served) -> Served:
     """The database with light at vertices as it is displayed on a white surface, times the colours;
-    none of its surfaces is lit. For pictures that compute no light."""
+    none of its surfaces is lit or reflects. For pictures that compute no light."""
     surfaces, white, tone = served.surfaces, _whites(served), tone_of(served.index)
     at_vertices = white > 0 if surfaces.lightmap is None else (white > 0) & (surfaces.lightmap < 0)
     color, colors = surfaces.color.copy(), surfaces.vertex_colors
@@ -280,7 +283,7 @@ def show_vertex_light(served: Served) -> Served:
         light = white[at_vertices, None, None] * to_linear(colors[at_vertices])
         colors[at_vertices] = tone.display(light.reshape(-1, 3)).reshape(light.shape) / 255
         color[at_vertices] = _factors(surfaces)[at_vertices] * colors[at_vertices].mean(axis=1)
-    unlit = replace(surfaces, white=None, color=color, vertex_colors=colors)
+    unlit = replace(surfaces, white=None, color=color, vertex_colors=colors, gloss=None)
     return replace(served, surfaces=unlit)
 
 

@@ -27,7 +27,7 @@ from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
 from ptmtools.pipeline.encoding import lossy_codes
 from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE
-from ptmtools.pipeline.stages.light import QUALITY, light_baking, unlit_faces
+from ptmtools.pipeline.stages.light import QUALITY, light_baking, true_works, unlit_faces
 from ptmtools.pipeline.stages.scene import lights_of, scene_origin
 from ptmtools.scene.colors import luminance, to_linear
 from ptmtools_lab.tradeoff.experiment import (
@@ -51,7 +51,8 @@ def prepare_lightmaps(subject: Subject, limit: int = MOST) -> Experiment:
     artifacts = subject.artifacts
     scene, lights = artifacts[SCENE], lights_of(artifacts)
     options = replace(subject.options(LIGHT), light="bake")
-    unlit = unlit_faces(scene, lights, options.true_colours, painted=False)
+    works = true_works(scene, options.true_colours, painted=False)
+    unlit = unlit_faces(scene, lights, works, painted=False)
     geometry, replaced = Geometry(scene, artifacts[CELLS]), scene_origin(artifacts).objects
 
     def pieces(density: float) -> list[CellSurfaces]:

@@ -30,7 +30,7 @@ from ptmtools.rendering.pyramids import pack_pyramids
 from ptmtools.rendering.rays import Caster
 from ptmtools.rendering.records import Sight
 from ptmtools.rendering.reflection import DIELECTRIC, Panorama, lit_radiance, mix_light, octahedral
-from ptmtools.rendering.tone import show_vertex_light, tone_of
+from ptmtools.rendering.tone import LitSurfaces, show_vertex_light, tone_of
 from ptmtools.site.pictures import _Scene
 from ptmtools_lab.catalogue import catalogue_of
 from ptmtools_lab.lossy import no_previews
@@ -443,6 +443,24 @@ def test_a_pane_before_dark_shows_more_than_before_bright() -> None:
     dark, bright = changes
     assert dark > 20
     assert bright < 0
+
+
+@pytest.mark.parametrize(("others", "white"), [("lit", 1.0), ("unlit", 0.0)])
+def test_only_layers_without_light_are_panes(others: str, white: float) -> None:
+    """A lit one, whose texture is half transparent, has its reflection among its colours. Panes
+    reflect in a building without any lit surface, too."""
+    served = glossy(FINISHES[0])
+    assert served.surfaces.white is not None
+    pane = np.arange(6) > 3
+    whites = np.where(pane, white, served.surfaces.white if others == "lit" else 0.0)
+    served = replace(served, surfaces=replace(served.surfaces, white=whites))
+    sight, layers = sight_of(served)
+    ray, triangle, _ = layers[0]
+    part = sight._replace(triangle=triangle.astype(np.int64), ray=sight.ray[ray])
+    shown, share = np.full((len(ray), 3), 99.0), np.full((len(ray), 1), 0.4)
+    tone = tone_of(served.index, 0)
+    color, alpha = LitSurfaces(served).layer(part, tone, lambda _: IMAGE, share, shown)
+    assert ((color == shown * share).all() and (alpha == share).all()) == (others == "lit")
 
 
 def test_extremes_are_colors() -> None:

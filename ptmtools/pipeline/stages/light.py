@@ -173,12 +173,22 @@ def _absence() -> MissingComponentError | None:
     return None
 
 
+def true_works(scene: Scene, true_colours: str, *, painted: bool) -> NDArray[np.bool_]:
+    """(T,) the faces of works that are shown in true colours."""
+    import numpy as np
+
+    from ptmtools.tour.pictures import works_of
+
+    if true_colours == "works" and not painted:
+        return works_of(scene)
+    return np.zeros(len(scene.triangles), np.bool_)
+
+
 def unlit_faces(
-    scene: Scene, lights: Lights | None, true_colours: str, *, painted: bool
+    scene: Scene, lights: Lights | None, works: NDArray[np.bool_], *, painted: bool
 ) -> NDArray[np.bool_]:
-    """(T,) the faces without light: those of works shown in true colours, and those of materials
-    that are seen through, whose colours contain it, without a lightmap of the model, or that glow.
-    """
+    """(T,) the faces without light: those of ``works``, and those of materials that are seen
+    through, whose colours contain it, without a lightmap of the model, or that glow."""
     import numpy as np
 
     from ptmtools.light.lamps import lamp_radiance
@@ -187,12 +197,7 @@ def unlit_faces(
     if lights is not None:
         dark |= lights.unlit
         dark |= lights.map < 0 if painted else lamp_radiance(scene, lights).any(axis=1)
-    unlit = dark[scene.triangle_material]
-    if true_colours == "works" and not painted:
-        from ptmtools.tour.pictures import works_of
-
-        unlit |= works_of(scene)
-    return unlit
+    return np.asarray(dark[scene.triangle_material] | works)
 
 
 def _paint(artifacts: Artifacts, lights: Lights) -> PaintedLight:
@@ -295,7 +300,10 @@ def _light_of(
         horizon = factor * np.array([daylight.sky, daylight.ground])
         shine = factor * building.shine
         first = geometry.piece[geometry.triangle_start[:-1]]
-        reflects = reflective_shapes(scene, geometry, unlit[run[CELLS].triangle_source[first]])
+        dark = unlit[run[CELLS].triangle_source[first]]
+        reflects = reflective_shapes(scene, lights_of(run), geometry, dark)
+        # They have a relief, or colours of their own.
+        reflects &= ~np.isin(geometry.object, scene_origin(run).objects)
         of_cells = np.split(reflects, geometry.cell_start[1:-1])
         chosen = [cell for cell, shapes in enumerate(of_cells) if shapes.any()]
         surfaces = BakedBuilding(building, pieces, lights, _tint(scene), 1 / factor)
@@ -382,7 +390,8 @@ class LightStage(Stage["Light"]):
         lights = lights_of(run)
         model_light = lights if lights and lights.maps and options.light != "bake" else None
         painted = model_light is not None
-        unlit = unlit_faces(scene, lights, options.true_colours, painted=painted)
+        works = true_works(scene, options.true_colours, painted=painted)
+        unlit = unlit_faces(scene, lights, works, painted=painted)
         asked = options.light_density
         replaced = scene_origin(run).objects
         geometry = Geometry(scene, cells)
@@ -409,6 +418,7 @@ class LightStage(Stage["Light"]):
         transaction.put_arrays(LIGHT.name, artifact.to_arrays())
         total = sum(served for _, served in baked) + probe_bytes
         counts = {**self.counts(artifact), "bytes": total, **_kind_of_light(shared.baking)}
+        counts["works"] = len(set(scene.triangle_object[works].tolist()))
         if options.light_density < asked:
             counts["reduced_density"] = options.light_density
         return complete(work, counts, _notes(cell_lights))
@@ -430,6 +440,7 @@ class LightStage(Stage["Light"]):
             ("with the sky", n.get("sky")),
             ("with ceilings that glow", n.get("ceilings")),
             (count(n.get("probes", 0), "probe"), n.get("probes")),
+            (f"pictures of {count(n.get('works', 0), 'object')} in true colours", n.get("works")),
             (f"reduced to {reduced:.1f} texels per metre, to save bytes", reduced),
         )
         total = n.get("bytes", n.get("ptm_bytes"))  # the latter of grey lightmaps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from ptmtools.light.model import CellSurfaces, Light
     from ptmtools.light.probes import Probe, ProbeBaking
     from ptmtools.output.geometry import Geometry
+    from ptmtools.scene.lights import Lights
     from ptmtools.scene.model import Scene
     from ptmtools.store.transaction import Transaction
 
@@ -70,7 +72,7 @@ def probe_files(light: Light | None) -> dict[int, str]:
 
 
 def reflective_shapes(
-    scene: Scene, geometry: Geometry, unlit: NDArray[np.bool_]
+    scene: Scene, lights: Lights | None, geometry: Geometry, unlit: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """(S,) the shapes that show a probe: glossy ones with light, and panes. ``unlit``: (S,) those
     without light."""
@@ -78,8 +80,8 @@ def reflective_shapes(
 
     glossy = np.array([m.glossy for m in scene.materials], np.bool_)
     pane = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
-    if scene.lights is not None:
-        pane &= ~scene.lights.unlit
+    if lights is not None:
+        pane &= ~lights.unlit
     material = geometry.material
     return np.asarray((glossy[material] & ~unlit) | pane[material])
 
@@ -126,7 +128,9 @@ def bake_probes(
     )
     faces = np.flatnonzero(scene.opaque)
     baking = ProbeBaking(lit.building, surfaces, faces, scene.corners[faces])
-    shared = ProbedCells(baking, run.recorded(TEXTURES))
+    # Options that leave out levels of the model's images do not concern probes.
+    levels = {"min_level": 0, "max_level": -1, "min_side": 1, "max_side": 0}
+    shared = ProbedCells(baking, replace(run.recorded(TEXTURES), **levels))
     tasks = [(cell, candidates(cells, cell)) for cell in chosen]
     baked, _ = bake_textures(run, transaction, bake_probe, shared, tasks, "probes")
     for cell, (probe, _) in zip(chosen, baked, strict=True):
@@ -135,7 +139,8 @@ def bake_probes(
 
 
 def _small_images(artifacts: Artifacts) -> list[NDArray[np.uint8]]:
-    """(h, w, 3) sRGB of each image of the scene: its finest level that is small enough."""
+    """(h, w, 3) sRGB of each image of the scene: its finest level that is small enough, or every
+    n-th texel of its coarsest."""
     import numpy as np
 
     from ptmtools.light.baked import SIDE
@@ -150,7 +155,8 @@ def _small_images(artifacts: Artifacts) -> list[NDArray[np.uint8]]:
         with reader.open(source) as ptm:
             levels = ptm.header.levels
             small = [k for k, level in enumerate(levels) if max(level.width, level.height) <= SIDE]
-            texels = in_eight_bits(ptm.level(small[-1]))
+            texels = in_eight_bits(ptm.level(small[-1] if small else 0))
         colors = texels[:, :, :3] if texels.shape[2] >= 3 else texels[:, :, [0, 0, 0]]
-        result.append(np.ascontiguousarray(colors))
+        step = math.ceil(max(colors.shape) / SIDE)
+        result.append(np.ascontiguousarray(colors[::step, ::step]))
     return result
