@@ -84,7 +84,8 @@ def wrong_counts(db: Path) -> set[str]:
     """The counts in the manifest, as "STAGE.NAME", that are not those of the served files."""
     stages = json.loads((db / "manifest.json").read_bytes())["stages"]
     sizes = {stage: _sizes(db, record["outputs"]) for stage, record in stages.items()}
-    files = sorted(set(db.glob("www/textures/*.ptm")) - set(db.glob("www/textures/light~*")))
+    baked = {file for kind in ("light", "probe") for file in db.glob(f"www/textures/{kind}~*")}
+    files = sorted(set(db.glob("www/textures/*.ptm")) - baked)
     headers = [read_header(path.read_bytes()) for path in files]
     finest = [(header.levels[-1], header.texel_bytes) for header in headers]
     counts: dict[str, dict[str, int]] = {
@@ -152,9 +153,11 @@ def _cells(
 ) -> Iterator[str]:
     with suppress(KeyError, TypeError):
         known = [cell["name"] for cell in index["cells"]]
-        # VRML shows neither light nor relief.
+        # VRML shows neither light nor reflections nor relief.
         images = [
-            set() if row.keys() & {"light", "relief"} else {row["file"], row["fallback"]} - {None}
+            set()
+            if row.keys() & {"light", "probe", "relief"}
+            else {row["file"], row["fallback"]} - {None}
             for row in index["textures"]
         ]
         for name in known:

@@ -37,10 +37,12 @@ def relations(
         yield from spatial_faults(of, index["viewpoints"], extent)
     with suppress(*FAULTS):
         yield from _boxes(index, of)
-    lightmaps = {n for n, row in enumerate(index["textures"]) if "light" in row}
+    baked = [
+        {n for n, row in enumerate(index["textures"]) if kind in row} for kind in ("light", "probe")
+    ]
     for i, record in of.items():
         with suppress(*FAULTS):
-            if fault := _shares(record, lightmaps):
+            if fault := _shares(record, baked):
                 yield f"shares: {i}: {fault}"
     with suppress(*FAULTS):
         for name in ("cells", "textures"):
@@ -117,7 +119,7 @@ def _boxes(index: Any, records: Mapping[int, Any]) -> Iterator[str]:
             yield f"box: {i}: does not contain the leaves"
 
 
-def _shares(record: Any, lightmaps: set[int]) -> str:
+def _shares(record: Any, baked: Sequence[set[int]]) -> str:
     for shares, share in zip(record.get("textureShares", ()), record["ach"], strict=False):
         if abs(sum(part for _, part in shares) - share) > STATISTICS_SLACK:
             return "the textures' do not sum to the cell's"
@@ -130,8 +132,9 @@ def _shares(record: Any, lightmaps: set[int]) -> str:
     needs = {row[0]: row[2:] for row in record.get("need", ())}
     if any(list(shares) != sorted(shares, reverse=True) for shares in needs.values()):
         return "the need of a texture increases"
-    # A surface shows its image and its lightmap.
-    for numbers in (needs.keys() & lightmaps, needs.keys() - lightmaps):
+    # A surface shows its image, its lightmap and its probe.
+    images = needs.keys() - set().union(*baked)
+    for numbers in (images, *(needs.keys() & numbers for numbers in baked)):
         if sum(needs[number][0] for number in numbers) > 1 + NEED_SLACK:
             return "the need sums to more than 1"
     return ""
