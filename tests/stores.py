@@ -21,12 +21,14 @@ CREDENTIALS = {
 
 @dataclass(frozen=True)
 class Request:
-    """A request to a store: method, path, the agent, and the bytes of its body."""
+    """A request to a store: method, path, the agent, the bytes of its body, and whether it asks for
+    a range."""
 
     method: str
     path: str
     agent: str
     sent: int
+    ranged: bool
 
 
 @dataclass
@@ -91,6 +93,7 @@ def s3_store() -> Iterator[Store]:
             environ["PATH_INFO"],
             environ.get("HTTP_USER_AGENT", ""),
             int(environ.get("CONTENT_LENGTH") or 0),
+            "HTTP_RANGE" in environ,
         )
         with changing:
             store.requests.append(request)

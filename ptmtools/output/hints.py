@@ -279,6 +279,8 @@ class RecordWriter:
         every view requires the finest level."""
         places, ach = self._content.places, self._content.ach
         for of_cells, worth in ((places.of_cell, 1.0), (places.probe, _OF_PROBES)):
+            if not of_cells:
+                continue
             shares = significant(worth * ach.value[ach.entries(cell)], NEED_DIGITS)
             for seen, share in zip(self._content.pvs.row(cell).tolist(), shares, strict=True):
                 if share and seen in of_cells:
