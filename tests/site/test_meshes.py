@@ -76,6 +76,7 @@ def test_an_object_is_simplified_at_first(
         assert not state["complete"]
         gate.open()
         visitor.go(0)
+        visitor.page.wait_for_function(f"{COUNTS}.here === {COUNTS}.drawn")  # by the next frame
         enough = visitor.page.evaluate(COUNTS)
         assert 80_000 < enough["here"] == enough["drawn"] < 163_880
         shown = visitor.picture().astype(float)
