@@ -42,7 +42,7 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (68_570, 334),
+    "ptmtools": (68_600, 334),
     "ptmtools/*.py": (4_140, 26),
     "ptmtools/cells": (7_990, 26),
     "ptmtools/cli": (3_110, 15),
