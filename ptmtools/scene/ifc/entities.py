@@ -10,7 +10,7 @@ the name, which most programs fill with a number, is added ("Office 1.07").
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import ChainMap, Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -134,19 +134,15 @@ def luminous_flux(file: Any, product: Any) -> float:
     """Lumens of a lamp, by its properties or those of its type."""
     from ifcopenshell.util import element, unit
 
-    properties: dict[str, Any] = {}
+    properties, watts = dict[str, Any](), 1.0
     with suppress(*FAULTS):
-        for members in element.get_psets(product).values():
-            properties.update(members)
-    for names, factor in ((_LUMENS, 1.0), (_POWERS, _LUMENS_OF_WATT)):
+        properties = dict(ChainMap(*reversed(element.get_psets(product).values())))
+        watts = float(unit.calculate_unit_scale(file, "POWERUNIT"))
+    for names, factor in ((_LUMENS, 1.0), (_POWERS, watts * _LUMENS_OF_WATT)):
         for name in names:
             value = properties.get(name)
             if isinstance(value, float | int) and 0 < value < math.inf:
-                watts = 1.0
-                if names is _POWERS:
-                    with suppress(*FAULTS):
-                        watts = float(unit.calculate_unit_scale(file, "POWERUNIT"))
-                return float(value) * factor * watts
+                return float(value) * factor
     return _LUMENS_OF_WATT * _WATTS
 
 
