@@ -6,7 +6,7 @@ Shading in Unreal Engine 4: the normal is the direction of the view), each an oc
 texture, and a client needs no cube map, whose faces browsers would filter as codes.
 
 Clients project directions to a box (Lagarde and Zanuttini 2012). Its sides are where most of the
-rays end that leave through them, not those of the cell: these may lie behind a wall.
+rays end that meet surfaces parallel to them, not those of the cell: these may lie behind a wall.
 
 Tried and rejected: patches of the transport instead of lightmaps (they show as a mosaic on polished
 floors); samples of the lobe instead of all texels (grain from lamps).
@@ -41,9 +41,9 @@ _RAYS = 4
 _BRIGHTEST = 256.0
 #: Height of a viewer's eyes, metres; candidates for the centre along each axis of the cell.
 _EYES, _GRID = 1.6, 5
-#: Rays from a candidate, metres beyond which surfaces are far enough, and how much rays count that
-#: end at the backs of walls.
-_FEW, _FAR, _OF_BACKS = 32, 10.0, 4.0
+#: Level rays from a candidate, their greatest length that counts, metres, and the power, beside
+#: that length, of the share of rays that end at no back of a wall, which counts as this at least.
+_LEVEL_RAYS, _GREATEST_LENGTH, _POWER_OF_SHARE, _LEAST_SHARE = 32, 10.0, 4.0, 1e-3
 #: Least cosine of a surface to a side of the box that it counts for.
 _PARALLEL = 0.9
 #: The least distance from the centre to a side of the box, metres.
@@ -109,14 +109,14 @@ class ProbeBaking:
     def _most_open(self, candidates: Floats) -> Floats:
         """The candidate farthest from walls: with the longest quarter of level rays, of which few
         end at the backs of walls. (By the mean of all rays it would be in a doorway.)"""
-        angle = 2 * math.pi * np.arange(_FEW) / _FEW
-        way = np.stack([np.cos(angle), np.zeros(_FEW), np.sin(angle)], axis=1)
+        angle = 2 * math.pi * np.arange(_LEVEL_RAYS) / _LEVEL_RAYS
+        way = np.stack([np.cos(angle), np.zeros(_LEVEL_RAYS), np.sin(angle)], axis=1)
         scores = []
         for point in candidates:
             hit = self._cast(point, way)
-            shows = (hit.front | (hit.face < 0)).mean()
-            length = np.quantile(np.clip(hit.distance, _NEAREST, _FAR), 0.25)
-            scores.append(math.log(length) + _OF_BACKS * math.log(max(shows, 1e-3)))
+            share = max((hit.front | (hit.face < 0)).mean(), _LEAST_SHARE)
+            length = np.quantile(np.clip(hit.distance, _NEAREST, _GREATEST_LENGTH), 0.25)
+            scores.append(math.log(length) + _POWER_OF_SHARE * math.log(share))
         return np.asarray(candidates[int(np.argmax(scores))])
 
     def _cast(self, point: Floats, way: Floats) -> _Hits:

@@ -184,13 +184,10 @@ class Geometry:
         return result
 
     def with_normals(self, scene: Scene, cells: Cells) -> Geometry:
-        """The same geometry, lit, with the normals of what is curved and reflects, without those
-        that have normal maps of their objects."""
+        """The same geometry, lit, with the normals of what is curved and reflects."""
         light = self.light
         assert light is not None
-        reflects = light.reflects.copy()
-        if self.relief is not None:
-            reflects &= ~self.relieved
+        reflects = light.reflects
         faces = np.flatnonzero(np.isin(scene.triangle_object, self.object[reflects]))
         if not len(faces):
             return self

@@ -102,9 +102,13 @@ class Material:
 
     @property
     def glossy(self) -> bool:
-        """Whether it reflects what has a shape; none can be seen in what is rougher. (Metals of
-        unstated roughness, 1, are many: exporters leave out both factors of glTF.)"""
+        """Whether shapes show in what it reflects: not in metals of unstated roughness, 1."""
         return self.roughness < 0.8
+
+    @property
+    def pane(self) -> bool:
+        """Whether it is glass: seen through, without an image."""
+        return self.opacity < 1 and self.image < 0
 
 
 @dataclass(frozen=True)

@@ -104,11 +104,11 @@ def quarters(db: Path, eye: Floats, point: Floats) -> Floats:
 
 def lit_materials(db: Path) -> dict[str, set[bool]]:
     """Object → whether its shapes have light."""
-    found: dict[str, set[bool]] = {}
+    lit: dict[str, set[bool]] = {}
     for file in (db / "www/gltf").glob("c*.glb"):
         for shape in read_glb(file.read_bytes()).primitives:
-            found.setdefault(shape.object, set()).add(shape.material.white is not None)
-    return found
+            lit.setdefault(shape.object, set()).add(shape.material.white is not None)
+    return lit
 
 
 def test_a_painting_in_red_light(tmp_path: Path) -> None:

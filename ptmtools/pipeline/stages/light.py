@@ -193,7 +193,7 @@ def unlit_faces(
 
     from ptmtools.light.lamps import lamp_radiance
 
-    dark = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
+    dark = np.array([m.pane for m in scene.materials], np.bool_)
     if lights is not None:
         dark |= lights.unlit
         dark |= lights.map < 0 if painted else lamp_radiance(scene, lights).any(axis=1)

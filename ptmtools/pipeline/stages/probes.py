@@ -79,7 +79,7 @@ def reflective_shapes(
     import numpy as np
 
     glossy = np.array([m.glossy for m in scene.materials], np.bool_)
-    pane = np.array([m.opacity < 1 and m.image < 0 for m in scene.materials], np.bool_)
+    pane = np.array([m.pane for m in scene.materials], np.bool_)
     if lights is not None:
         pane &= ~lights.unlit
     material = geometry.material
