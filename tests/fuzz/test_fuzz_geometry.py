@@ -44,8 +44,8 @@ def test_a_door_leaf_that_is_open_above() -> None:
 def test_every_fault_is_found(fault: str) -> None:
     summary = fuzz("two_rooms", seed=0, start=0, count=6, fault=fault)
     findings = [what for _, what in summary.tally.findings]
-    assert any(EXPECTED[fault] in what for what in findings)
-    assert all(EXPECTED[fault] in what for what in findings)
+    assert findings
+    assert [what for what in findings if EXPECTED[fault] not in what] == []
 
 
 def test_inputs_follow_from_seed_and_number(tmp_path: Path) -> None:
