@@ -276,6 +276,39 @@ def test_low_quality_reflects_nothing(revisit: Visiting, plain: Site) -> None:
     assert low["metal"].std(axis=0).max() < 2
 
 
+#: A graphics card, or none, as a browser says it; and the numbers of texels that textures average.
+CARD = """
+card => {
+  const { getContext } = HTMLCanvasElement.prototype;
+  const { texParameterf } = WebGL2RenderingContext.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    if (!options?.failIfMajorPerformanceCaveat) return getContext.call(this, kind, options);
+    return card ? getContext.call(this, kind, { antialias: true }) : null;
+  };
+  globalThis.slants = [];
+  WebGL2RenderingContext.prototype.texParameterf = function (target, name, value) {
+    if (name === 0x84fe) globalThis.slants.push(value);
+    texParameterf.call(this, target, name, value);
+  };
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("card", "query", "slants"),
+    [("true", "", {4}), ("false", "", set()), ("true", "?quality=low", set())],
+)
+def test_graphics_cards_filter_along_the_line_of_sight(
+    visit: Visiting, plain: Site, card: str, query: str, slants: set[int]
+) -> None:
+    def prepare(page: Any) -> None:
+        page.add_init_script(f"({CARD.strip()})({card})")
+
+    with visit(plain, query=query, prepare=prepare, width=64, height=48) as visitor:
+        visitor.complete()
+        assert set(visitor.page.evaluate("slants")) == slants
+
+
 #: Exposures of a walk through the door, at these cells, places along x and times, s.
 EXPOSURES = """
 ([fades, steps]) => {

@@ -8,6 +8,8 @@ import { withOffset } from "../../client/src/levels.js";
 export const STRIPE = 256 << 10;
 /** Seconds in which a new level fades in. */
 const FADE = 0.3;
+/** Texels along the line of sight that a graphics card averages where a surface is seen from the side. */
+const SLANT = 4;
 
 /**
  * Formats by channels on the GPU, which has no texels of three bytes.
@@ -42,6 +44,9 @@ export class Storage {
     gl.texStorage2D(gl.TEXTURE_2D, sizes.length, formats(gl, channels).inside, width, height);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    // As smooth edges, it costs too much without a graphics card.
+    const slanted = gl.getContextAttributes()?.antialias && gl.getExtension("EXT_texture_filter_anisotropic");
+    if (slanted) gl.texParameterf(gl.TEXTURE_2D, slanted.TEXTURE_MAX_ANISOTROPY_EXT, SLANT);
   }
 
   get levels() {
