@@ -153,7 +153,8 @@ def read(target: Target, watch: Watch, case: Case, number: int, slow: float, bat
     took = time.process_time() - start
     grown = most_memory() - before
     if compilations() != compiled:
-        return read(target, watch, case, number, slow, batch)
+        read(target, watch, case, number, slow, batch)
+        return
     batch.outcomes[outcome] += 1
     batch.longest, batch.most = max(batch.longest, took), max(batch.most, grown)
     if fault:

@@ -52,6 +52,9 @@ _WHITE = 0.995
 #: and the share of the surfaces that is no brighter than the other number, so that white walls keep
 #: their texture.
 _KEY, _HIGH, _MOST_OF_WHITE = 0.3, 0.9, 0.75
+#: Eyes get used to this share of a hue, as photographers balance white, a logarithm; and components
+#: of light count as at least this share of its luminance.
+_ADAPTATION, _LEAST_HUE = 0.7, 0.1
 #: The side of a lightmap is a multiple of this, so that four of its levels halve exactly,
 _MULTIPLE = 16
 #: and at most this, texels.
@@ -76,8 +79,8 @@ class CellLight:
     ----------
     white: the light of which texels and `vertex` are shares.
     texels: (side, side, 3) codes, see `light_codes`; None without a lightmap.
-    exposure: the factor with which it shows by itself, see `_exposure`, and the area of its lit
-        surfaces, m².
+    exposure: (3,) logarithms of the factors of red, green and blue by itself, see `_exposure`.
+    area: of its lit surfaces, m².
     crowded: whether neighbours in the lightmap run into each other.
     density: texels to the metre, of those that were asked for; 1 without a lightmap.
     """
@@ -88,7 +91,8 @@ class CellLight:
     vertex: NDArray[np.uint8]
     white: float
     texels: Singles | None
-    exposure: tuple[float, float]
+    exposure: Floats
+    area: float
     crowded: bool
     density: float = 1.0
 
@@ -138,7 +142,8 @@ class LightBaking:
             weights.append(np.where(np.isnan(light[:, 0]), 0.0, area))
         sample, weight = np.concatenate(samples), np.concatenate(weights)
         white = self._white(sample, weight)
-        radiance = luminance(sample.astype(np.float64)) * self.reflectance[np.concatenate(faces)]
+        reflectance = self.reflectance[np.concatenate(faces)]
+        exposure, lit_area = _exposure(sample.astype(np.float64), reflectance, weight)
         shares = encode_srgb(vertex.astype(np.float64) / white)
         return CellLight(
             mapped,
@@ -147,7 +152,8 @@ class LightBaking:
             np.where(dense[:, None, None], shares, np.uint8(255)),
             white,
             None if texels is None else light_codes(texels, white),
-            _exposure(radiance, weight),
+            exposure,
+            lit_area,
             *rest,
         )
 
@@ -236,18 +242,26 @@ def _brighten(painted: PaintedLight) -> Look:
     return look
 
 
-def _exposure(radiance: Floats, weight: Floats) -> tuple[float, float]:
-    """The logarithm of the factor with which some radiance of this weight shows, and the weight of
-    what is not 0."""
+def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[Floats, float]:
+    """(3,) logarithms of the factors with which (n, 3) light of this weight shows on surfaces of
+    (n,) reflectance, and the weight of what is not black."""
+    bright = luminance(light)
+    radiance = bright * reflectance
     shows = np.flatnonzero((radiance > 0) & (weight > 0))
     if not len(shows):
-        return 0.0, 0.0
+        return np.zeros(3), 0.0
     order = shows[np.argsort(radiance[shows], kind="stable")]
     total = np.cumsum(weight[order])
     # No dot product: its rounding follows the number of threads.
     mean = float((weight[order] * np.log(radiance[order])).sum()) / float(total[-1])
-    bright = radiance[order[np.searchsorted(total, _HIGH * total[-1])]]
-    return min(math.log(_KEY) - mean, math.log(_MOST_OF_WHITE / bright)), float(total[-1])
+    high = radiance[order[np.searchsorted(total, _HIGH * total[-1])]]
+    exposure = min(math.log(_KEY) - mean, math.log(_MOST_OF_WHITE / high))
+    hue = np.log(np.maximum(light[shows] / bright[shows, None], _LEAST_HUE))
+    tint = (weight[shows, None] * hue).sum(axis=0) / total[-1]
+    balanced = (1 - _ADAPTATION) * tint
+    # A white surface keeps its luminance.
+    kept = np.log(luminance(np.exp(tint)) / luminance(np.exp(balanced)))
+    return exposure + balanced - tint + kept, float(total[-1])
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:

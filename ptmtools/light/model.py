@@ -66,7 +66,8 @@ class Light:
     ----------
     side: (C,) int32 texels, width and height of the lightmap of each cell; 0 without one.
     white: (C,) the light of each cell of which codes and `vertex` are shares.
-    exposure: (C,) the factor with which the light shows while the eye is in the cell.
+    exposure: (C, 3) the factors with which red, green and blue light show while the eye is in the
+        cell.
     lit, mapped: (S,) whether a shape has light, and whether in the lightmap of its cell; else it is
         at its vertices.
     uv: (M, 3, 2) float32 coordinates in that lightmap, in [0, 1], origin at the lower left.
@@ -114,9 +115,8 @@ class Light:
         side = stored.array("side", np.int32, None)
         if (side < 0).any():
             raise ValueError("a lightmap has a negative size")
-        white, exposure = (
-            stored.array(name, np.float64, len(side), finite=True) for name in ("white", "exposure")
-        )
+        white = stored.array("white", np.float64, len(side), finite=True)
+        exposure = stored.array("exposure", np.float64, len(side), 3, finite=True)
         if not ((white > 0).all() and (exposure > 0).all()):
             raise ValueError("a cell has no light of white, or no exposure")
         mapped = stored.array("mapped", np.bool_, None)

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 FORMAT = "ptmtools hints"
 #: Of the index, the records and the statistics.
-SCHEMA = 2
+SCHEMA = 3
 
 
 def index_text(content: Content) -> str:
@@ -77,7 +77,8 @@ def index_text(content: Content) -> str:
         head["firstLook"] = FIRST_LOOK_FILES
     if light := content.extras.light:
         head["light"] = light.display(content.options.tone)
-    exposures = significant(light.exposure, NEED_DIGITS) if light else []
+    factors = significant(light.exposure.ravel(), NEED_DIGITS) if light else []
+    exposures = [factors[k : k + 3] for k in range(0, len(factors), 3)]
     materials = content.scene.materials
     # Images that are normal maps of materials, and nothing else.
     normal_maps = {m.normal.image for m in materials if m.normal} - {m.image for m in materials}
@@ -94,7 +95,7 @@ def index_text(content: Content) -> str:
             {"name": cell_name(c), "box": box}
             | ({} if standing else {"standing": False})
             | ({"room": room} if (room := cells.room_name(c)) else {})
-            | ({"exposure": exposures[c]} if exposures and exposures[c] != 1 else {})
+            | ({"exposure": exposures[c]} if exposures and exposures[c] != [1, 1, 1] else {})
             for c, (box, standing) in enumerate(
                 zip(_boxes(content), cells.standing.tolist(), strict=True)
             )

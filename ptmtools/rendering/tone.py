@@ -51,13 +51,13 @@ class Tone:
 
     Attributes
     ----------
-    stops: powers of two from code 0 to code 255. exposure: factor of radiance.
+    stops: powers of two from code 0 to code 255. exposure: (3,) factors of radiance.
     curve: of `CURVES`, or "plain": radiance is clipped at 1.
     background: (2, 3) radiance of ground and sky; None: the background is `SKY`.
     """
 
     stops: float
-    exposure: float
+    exposure: Floats
     curve: str
     background: Floats | None
 
@@ -89,10 +89,10 @@ def tone_of(index: Mapping[str, Any], cell: int = -1) -> Tone | None:
     head = index.get("light")
     if head is None:
         return None
-    exposure, background = 1.0, None
+    exposure, background = np.ones(3), None
     if head["tone"] in CURVES:
         if cell >= 0:
-            exposure = float(index["cells"][cell].get("exposure", 1.0))
+            exposure = np.array(index["cells"][cell].get("exposure", exposure), np.float64)
         if "sky" in head and "ground" in head:
             background = np.array([head["ground"], head["sky"]], np.float64)
     return Tone(float(head["stops"]), exposure, head["tone"], background)

@@ -190,8 +190,8 @@ def test_three_js_moves_on(three: Any, rooms: Path, after: int) -> None:
 
 def test_three_js_refuses_another_schema(three: Any, gltf_museum: Path, tmp_path: Path) -> None:
     www = Path(shutil.copytree(gltf_museum / "www", tmp_path / "www"))
-    (www / "hints.json").write_text(json.dumps(read(www, "hints.json") | {"schema": 3}))
-    assert "hints of schema 3, not 2" in " ".join(three.walk(www, width=64, height=64).messages)
+    (www / "hints.json").write_text(json.dumps(read(www, "hints.json") | {"schema": 4}))
+    assert "hints of schema 4, not 3" in " ".join(three.walk(www, width=64, height=64).messages)
 
 
 def test_three_js_complains(three: Any, gltf_museum: Path, tmp_path: Path) -> None:
@@ -287,7 +287,7 @@ def lit_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hints = folder / "lit/www/hints.json"
     index = json.loads(hints.read_text())
     for cell in index["cells"]:
-        cell["exposure"] = 0.5
+        cell["exposure"] = [0.5, 0.5, 0.5]
     hints.write_text(json.dumps(index))
     return folder
 
@@ -364,7 +364,7 @@ def test_three_js_follows_the_formula_of_light(
     less, more = EXPOSURE
     before, *_, soon, late, after = answer["exposures"]
     assert (before, late, after) == (more, less, more)
-    assert less <= soon < more
+    assert all(least <= part < most for least, part, most in zip(less, soon, more, strict=True))
 
 
 MIRRORS = """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -57,9 +57,9 @@ def decoded(color: float) -> float:
     return color / 12.92 if color <= 0.04045 else ((color + 0.055) / 1.055) ** 2.4
 
 
-def displayed(radiance: list[float], exposure: float, toned: bool) -> list[float]:
+def displayed(radiance: list[float], exposure: Sequence[float], toned: bool) -> list[float]:
     """A colour, 0 to 255, of linear radiance."""
-    x = [value * exposure for value in radiance]
+    x = [value * factor for value, factor in zip(radiance, exposure, strict=True)]
     peak = max(x)
     if toned and peak > 0.8:
         limit = 1 - 0.2 * 0.2 / (peak + 0.2 - 0.8)
@@ -68,9 +68,9 @@ def displayed(radiance: list[float], exposure: float, toned: bool) -> list[float
     return [255 * encoded(value) for value in x]
 
 
-def index_of(light: Mapping[str, Any] | None, *exposures: float) -> dict[str, Any]:
+def index_of(light: Mapping[str, Any] | None, *exposures: Sequence[float]) -> dict[str, Any]:
     row = {"components": 3, "ends": [1], "width": 1, "height": 1}
-    cells: list[dict[str, float]] = [{"exposure": value} for value in exposures] or [{}]
+    cells: list[dict[str, Any]] = [{"exposure": list(value)} for value in exposures] or [{}]
     index: dict[str, Any] = {"textures": [row, row], "cells": cells, "viewpoints": []}
     return index | ({"light": dict(light)} if light else {})
 
@@ -87,7 +87,9 @@ def served_of(surfaces: Surfaces, index: Mapping[str, Any]) -> Served:
     )
 
 
-def strips(light: Mapping[str, Any] | None = NEUTRAL, exposure: float = 1.0) -> Served:
+def strips(
+    light: Mapping[str, Any] | None = NEUTRAL, exposure: Sequence[float] = (1, 1, 1)
+) -> Served:
     """Two faces each: with image and lightmap, with light at vertices, and not lit."""
     corner, spot = [], []
     for low, high in pairwise(EDGES):
@@ -136,13 +138,15 @@ def pictured(served: Served, sight: Sight, tone: Tone | None, monkeypatch: Any) 
     return _Scene(served)._colors(textures, tone, sight)
 
 
-def expected_colors(sight: Sight, tone: str | None, exposure: float) -> Floats:
+def expected_colors(sight: Sight, tone: str | None, exposure: Sequence[float]) -> Floats:
     """(n, 3) colours of the pixels of `strips`, one by one."""
     toned = tone == "neutral"
     return np.array([_expected(ray, tone, toned, exposure) for ray in sight.ray.tolist()])
 
 
-def _expected(ray: list[float], tone: str | None, toned: bool, exposure: float) -> list[float]:
+def _expected(
+    ray: list[float], tone: str | None, toned: bool, exposure: Sequence[float]
+) -> list[float]:
     x, y = FAR * ray[0], FAR * ray[1]
     if not EDGES[0] < x < EDGES[-1]:
         return _outside(ray, exposure) if toned else list(SKY)
@@ -174,7 +178,7 @@ def _expected(ray: list[float], tone: str | None, toned: bool, exposure: float) 
     return [255 * shade * encoded(f) * v for f, v in zip(TINT, colors, strict=True)]
 
 
-def _outside(ray: list[float], exposure: float) -> list[float]:
+def _outside(ray: list[float], exposure: Sequence[float]) -> list[float]:
     at = min(max((ray[1] / math.hypot(*ray) + 0.02) / 0.04, 0), 1)
     share = at * at * (3 - 2 * at)
     pairs = zip(GROUND_LIGHT, SKY_LIGHT, strict=True)
@@ -183,12 +187,19 @@ def _outside(ray: list[float], exposure: float) -> list[float]:
 
 @pytest.mark.parametrize("draw", [painted, pictured])
 @pytest.mark.parametrize(
-    ("light", "exposure"), [(NEUTRAL, 1.0), (NEUTRAL, 0.3), (NEUTRAL, 6.0), (PLAIN, 6.0), (None, 6)]
+    ("light", "exposure"),
+    [
+        (NEUTRAL, (1, 1, 1)),
+        (NEUTRAL, (0.3, 0.2, 0.1)),
+        (NEUTRAL, (4, 5, 6)),
+        (PLAIN, (6, 6, 6)),
+        (None, (6, 6, 6)),
+    ],
 )
 def test_pictures_show_light_by_the_formula(
     draw: Callable[..., Floats],
     light: Mapping[str, Any] | None,
-    exposure: float,
+    exposure: Sequence[float],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """In lightmaps and at vertices; not on what is not lit, which is brighter beside it. Light of
@@ -198,14 +209,14 @@ def test_pictures_show_light_by_the_formula(
     assert {*sight.triangle.tolist()} == {-1, *range(6)}
     actual = draw(served, sight, tone_of(served.index, 0), monkeypatch)
     tone = light["tone"] if light else None
-    expected = expected_colors(sight, tone, exposure if tone == "neutral" else 1.0)
+    expected = expected_colors(sight, tone, exposure if tone == "neutral" else (1, 1, 1))
     np.testing.assert_allclose(actual, expected, atol=1e-6)
 
 
 def test_frames_of_the_simulator_show_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """With what a client has: of a lightmap without levels, the mean code. A cell without geometry
     is grey."""
-    served, pyramids = strips(NEUTRAL, 2.0), pack_pyramids(levels())
+    served, pyramids = strips(NEUTRAL, (2.0, 1.5, 1.0)), pack_pyramids(levels())
     pyramids = pyramids._replace(mean=np.array([TEXEL, np.mean(CODES, axis=0)], np.float64))
     world: Any = SimpleNamespace(
         served=served,
@@ -234,10 +245,14 @@ def test_frames_of_the_simulator_show_it(monkeypatch: pytest.MonkeyPatch) -> Non
     np.testing.assert_allclose(grey[~hit], expected[~hit])
 
 
+#: Exposures of two cells.
+LITTLE, MUCH = (0.5, 0.4, 0.6), (4.0, 3.0, 5.0)
+
+
 def test_an_eye_has_the_exposure_of_its_cell(monkeypatch: pytest.MonkeyPatch) -> None:
     """That of the viewpoint, or that in which it is; 1 outside all."""
     served = strips(NEUTRAL)
-    index = index_of(NEUTRAL, 0.5, 4.0)
+    index = index_of(NEUTRAL, LITTLE, MUCH)
     view: dict[str, Any] = {
         "position": [-4.5, 0, 0],
         "direction": [0, 0, -1],
@@ -250,10 +265,10 @@ def test_an_eye_has_the_exposure_of_its_cell(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("ptmtools.rendering.painting.read_pyramids", lambda *_: pyramids)
     size = {"width": 4, "height": 2, "field_of_view": 10.0}
     for options, exposure in (
-        (ViewOptions(**size), 4.0),  # type: ignore[arg-type]
-        (ViewOptions(eye=(-9, 0, 0), look=(-9, 1, 0), **size), 0.5),  # type: ignore[arg-type]
-        (ViewOptions(eye=(19, 0, 0), look=(19, 1, 0), **size), 4.0),  # type: ignore[arg-type]
-        (ViewOptions(eye=(0, 11, 0), look=(0, 99, 0), **size), 1.0),  # type: ignore[arg-type]
+        (ViewOptions(**size), MUCH),  # type: ignore[arg-type]
+        (ViewOptions(eye=(-9, 0, 0), look=(-9, 1, 0), **size), LITTLE),  # type: ignore[arg-type]
+        (ViewOptions(eye=(19, 0, 0), look=(19, 1, 0), **size), MUCH),  # type: ignore[arg-type]
+        (ViewOptions(eye=(0, 11, 0), look=(0, 99, 0), **size), (1, 1, 1)),  # type: ignore[arg-type]
     ):
         expected = displayed(list(SKY_LIGHT), exposure, True)
         if options.eye is None:
@@ -262,17 +277,17 @@ def test_an_eye_has_the_exposure_of_its_cell(monkeypatch: pytest.MonkeyPatch) ->
         actual = draw_view(served, options)[0, 0]
         np.testing.assert_allclose(actual, expected, atol=0.51)
     scene, textures = _Scene(served), _Textures(served, 1)
-    for more, exposure in ({}, 4.0), ({"cell": 0}, 0.5), ({"cell": None}, 0.5):
+    for more, exposure in ({}, MUCH), ({"cell": 0}, LITTLE), ({"cell": None}, LITTLE):
         picture = scene._view(PictureKind((2, 2), 999), view | more, textures)
         assert picture.tone
-        assert picture.tone.exposure == exposure
+        assert tuple(picture.tone.exposure) == exposure
 
 
 @pytest.mark.parametrize("exposure", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("white", [1e-6, 1.0, 1e9])
 @pytest.mark.parametrize("curve", ["plain", "neutral", "agx"])
 def test_extremes_are_colors(white: float, exposure: float, curve: str) -> None:
-    tone = Tone(STOPS, exposure, curve, np.array([[0, 0, 0], [white] * 3]))
+    tone = Tone(STOPS, np.full(3, exposure), curve, np.array([[0, 0, 0], [white] * 3]))
     code = np.array([[0, 0, 0], [255, 255, 255], [0, 255, 0], [255, 254, 253]], np.float64)
     with np.errstate(all="raise", under="ignore"):
         light = tone.light(np.full(4, white), code)
@@ -327,7 +342,7 @@ def test_light_at_vertices_for_pictures_that_compute_none() -> None:
             lit = replace(lit, color=np.tile(encoded_tint(), (6, 1)))
         shown = show_vertex_light(replace(served, surfaces=lit)).surfaces
         light = CORNERS if colors is not None else np.ones((3, 3))
-        expected = [displayed([WHITE[1] * v for v in corner], 1.0, True) for corner in light]
+        expected = [displayed([WHITE[1] * v for v in corner], (1, 1, 1), True) for corner in light]
         assert shown.white is None
         assert shown.vertex_colors is not None
         np.testing.assert_allclose(255 * shown.vertex_colors[2], expected)

@@ -187,7 +187,7 @@ def test_a_pane_is_no_surface_of_the_light() -> None:
     building = BuildingBaking(scene, [glass], None, np.full((12, 3), 0.5)).light()
     result = LightBaking(OPTIONS, building, None, np.full(12, 0.5, np.float32)).light(glass)
     assert not result.lit.any()
-    assert result.exposure == (0.0, 0.0)
+    assert result.area == 0
 
 
 def test_a_texel_beside_a_thin_wall_has_no_light_of_the_other_side() -> None:

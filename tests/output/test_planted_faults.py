@@ -200,7 +200,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D700", rewritten(HINTS, lambda data: data[:-3])),
     ("D700", replaced(HINTS, r'"unit":', '"units":')),
     ("D700", replaced(HINTS, r'"unit":', '"up": "y", "unit":')),
-    ("D700", replaced(HINTS, r'"schema":2', '"schema":2.0')),
+    ("D700", replaced(HINTS, r'"schema":3', '"schema":3.0')),
     ("D700", replaced(R0, r'"area":[.\d]+', '"area":NaN')),
     ("D700", replaced(R0, r'"area":[.\d]+', '"area":1e999')),
     ("D700", replaced(R0, r'"visible":\[\d', '"visible":[77')),
@@ -310,7 +310,7 @@ FAULTS: list[tuple[str, Damage]] = [
         ("other_schema", hinted(lambda d: d.update(schema=1), name))
         for name in (HINTS, R0, STATISTICS)
     ),
-    ("other_schema", hinted(lambda d: d.update(schema=3, cells="of another kind"))),
+    ("other_schema", hinted(lambda d: d.update(schema=4, cells="of another kind"))),
     ("first_look", hinted(lambda d: d.pop("firstLook"))),
     ("first_look", cell(0, lambda c: c.pop("firstLook"))),
     ("first_look bundle", cell(0, lambda c: c["firstLook"].pop())),
@@ -393,7 +393,7 @@ def test_hints_of_another_schema_name_the_command(database: Path, seal: Damage) 
     hinted(lambda d: d.update(schema=1))(database)
     seal(database)
     (line,) = findings(database)
-    assert "schema: error: is 1, this ptmtools reads 2; `ptm build-scene`" in line
+    assert "schema: error: is 1, this ptmtools reads 3; `ptm build-scene`" in line
 
 
 @pytest.mark.parametrize("texture", [None, 0, 1])

@@ -207,7 +207,7 @@ def mirrors_of(
         t = np.clip((rough - 0.2) / 0.6, 0, 1)
         reflection += (light - reflection) * t * t * (3 - 2 * t)
         matt = base * light * (1 - metallic) * (1 - share.max(axis=-1, keepdims=True))
-        return developed(EXPOSURE[0] * (matt + reflection * share), "neutral")
+        return developed(np.array(EXPOSURE[0]) * (matt + reflection * share), "neutral")
 
     facing = (0.7 + 0.3 * view[..., 2])[..., None] if shaded else 1.0
     reflection, scale, bias = seen(flat, POLISH["glass"][1])

@@ -4,7 +4,7 @@ them, in the files of a site of two rooms."""
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,7 +30,7 @@ STRIPS = {
 }
 #: Eyes, one in each room, which look along -z; exposures of their cells.
 EYES = [(-1.5, 1.5, 0.0), (1.5, 1.5, 0.0)]
-EXPOSURE = [0.6, 2.5]
+EXPOSURE = [[0.6, 0.5, 0.7], [2.5, 3.0, 2.0]]
 LIGHT = {"stops": 10, "tone": "neutral", "sky": [0.5, 0.7, 1.4], "ground": [0.3, 0.2, 0.1]}
 #: Of the image, sRGB; the factors of the others, linear; white of lightmap and vertices.
 BASE, FACTOR = (180, 120, 60), (0.5, 0.7, 0.9)
@@ -180,7 +180,7 @@ def view_of(
     eye: tuple[float, float, float],
     angle: float,
     size: tuple[int, int],
-    exposure: float,
+    exposure: Sequence[float],
     tone: str,
 ) -> tuple[Floats, dict[str, NDArray[np.bool_]]]:
     """(h, w, 3) of 255 what an eye sees along -z, in a picture of (w, h) pixels, and (h, w) where
@@ -205,13 +205,13 @@ def view_of(
     around = (
         np.broadcast_to(SLATE, around.shape)
         if tone == "plain"
-        else developed(around * exposure, tone)
+        else developed(around * np.array(exposure), tone)
     )
     colors = {
-        "mapped": developed(mapped * exposure, tone),
-        "vertices": developed(vertices * exposure, tone),
+        "mapped": developed(mapped * np.array(exposure), tone),
+        "vertices": developed(vertices * np.array(exposure), tone),
         "unlit": plain,
-        "bumpy": developed(mapped * exposure, tone),
+        "bumpy": developed(mapped * np.array(exposure), tone),
     }
     picture, masks, edge = around.copy(), {}, 0.1
     beyond = np.ones(at.shape, bool)

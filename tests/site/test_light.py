@@ -46,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hints = folder / "lit/www/hints.json"
     index = json.loads(hints.read_text())
     for cell in index["cells"]:
-        cell["exposure"] = 0.5
+        cell["exposure"] = [0.5, 0.5, 0.5]
     hints.write_text(json.dumps(index))
     return folder
 
@@ -180,7 +180,7 @@ def check_strips(visitor: Visitor, site: Site, tone: str, size: tuple[int, int])
     for eye, exposure in zip(EYES, EXPOSURE, strict=True):
         stand(visitor, eye)
         visitor.complete()
-        exposed = 1.0 if tone == "plain" else exposure
+        exposed = [1, 1, 1] if tone == "plain" else exposure
         expected, parts = view_of(eye, angle, size, exposed, tone)
         apart = np.abs(visitor.picture() - expected).max(axis=2)
         assert [name for name, part in parts.items() if apart[part].max() > 3] == []
@@ -345,7 +345,7 @@ HOSTILE: dict[str, tuple[Callable[[dict[str, Any]], None], dict[str, Any]]] = {
     "a range that is no number": (change(stops="many"), {}),
     "an infinite sky": (change(sky=[0, 1e999, 0]), {}),
     "a sky that is no colour": (change(sky=3), {}),
-    "a dark cell": (lambda index: index["cells"][1].update(exposure=-1), {}),
+    "a dark cell": (lambda index: index["cells"][1].update(exposure=[1, 1, -1]), {}),
     "a negative white": (change(), {"white": -1}),
     "a lightmap without a white": (change(), {"white": None}),
 }

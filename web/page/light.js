@@ -1,9 +1,9 @@
 // The script of sites with light: it shows surfaces in linear light, exposed for the viewer's cell, what they
 // reflect, and sky and ground around the building (docs/formats/hints.md#colours).
 
-/** Seconds in which the exposure nearly reaches that of another cell, metres of a frame that are a jump, and a
- * share of the exposure that does not show. */
-const EASE = 0.2, JUMP = 1, UNSEEN = 0.01;
+/** Seconds in which the exposure nearly reaches that of another cell, metres of a frame that are a jump, a share
+ * of the exposure that does not show, and the usual exposure. */
+const EASE = 0.2, JUMP = 1, UNSEEN = 0.01, USUAL = [1, 1, 1];
 
 /** Linear light of colours as sRGB encodes them (IEC 61966-2-1), here and below to 0.1 of 255: powers would double
  * the time of a picture without a graphics card. */
@@ -61,7 +61,7 @@ uniform vec3 centre;
 uniform vec3 low;
 uniform vec3 high;
 uniform vec2 polish; // metallic, roughness
-uniform vec2 power; // exposed: of the greatest code, on average
+uniform vec2 power; // of the greatest code, on average
 uniform sampler2D probe;
 uniform vec3 haze; // until the probe arrives, the mean of its codes; negative with it
 vec3 way;
@@ -106,7 +106,8 @@ const GLASS = `
     meet();
     float share = 0.04 * part.x + part.y;
     share *= 1.9 - 0.9 * share;
-    vec3 behind = seenAlong(away, 1.0), image = developed(behind * (1.0 - share) + seenAlong(way, polish.y) * share);
+    vec3 behind = seenAlong(away, 1.0) * exposure;
+    vec3 image = developed(behind * (1.0 - share) + seenAlong(way, polish.y) * share * exposure);
     shown.rgb *= shown.a * (1.0 - share);
     shown.rgb += max(image - (1.0 - share) * developed(behind), 0.0);
     shown.a += share * (1.0 - shown.a);
@@ -117,7 +118,8 @@ const GLASS = `
 const fragmentsOf = ({ stops, tone }, reflects) => `
 const float stops = float(${stops});
 in vec2 spot;
-uniform float white; // exposed; 0 of unlit surfaces
+uniform float white; // 0 of unlit surfaces
+uniform vec3 exposure;
 uniform sampler2D lightmap;
 uniform vec3 code; // 1 of light at vertices; until the lightmap arrives, its mean; negative with it
 ${LINEAR}
@@ -126,8 +128,8 @@ ${reflects ? REFLECTIONS : ""}
 vec3 display(vec3 texel) {
   if (white == 0.0) return texel * color.rgb * painted;
   vec3 share = code.r < 0.0 ? texture(lightmap, spot).rgb : code;
-${reflects ? `  return developed(reflected(linear(texel) * color.rgb * painted, white * exp2(stops * (share - 1.0))));`
-    : `  return developed(linear(texel) * color.rgb * painted * white * exp2(stops * (share - 1.0)));`}
+${reflects ? `  return developed(exposure * reflected(linear(texel) * color.rgb * painted, white * exp2(stops * (share - 1.0))));`
+    : `  return developed(linear(texel) * color.rgb * painted * white * exposure * exp2(stops * (share - 1.0)));`}
 }
 void main`;
 
@@ -159,7 +161,8 @@ void main() {
 /** @typedef {import("./gl/program.js").Program} Program */
 
 export class Light {
-  exposure = 1;
+  /** Factors of red, green and blue. */
+  exposure = USUAL;
   /** Where the viewer was, and when, s. @type {number[]} */
   #eye = [];
   #before = 0;
@@ -216,10 +219,12 @@ export class Light {
    */
   adapt({ cell, client: { known }, index: { cells }, memory: { fades }, picture }, eye, now) {
     const { exposure, row: { tone } } = this;
-    const target = cell < 0 || tone === "plain" ? exposure : cells[cell].exposure ?? 1;
+    const target = cell < 0 || tone === "plain" ? exposure : cells[cell].exposure ?? USUAL;
     this.#jumped ||= !(Math.hypot(...eye.map((x, k) => x - this.#eye[k])) < JUMP);
-    const ratio = this.#jumped || !fades ? 1 : (exposure / target) ** Math.exp((this.#before - now) / EASE);
-    this.exposure = Math.abs(Math.log(ratio)) < UNSEEN ? target : target * ratio;
+    const left = this.#jumped || !fades ? 0 : Math.exp((this.#before - now) / EASE);
+    const ratios = target.map((part, k) => (exposure[k] / part) ** left);
+    const seen = ratios.some((ratio) => Math.abs(Math.log(ratio)) > UNSEEN);
+    this.exposure = seen ? target.map((part, k) => part * ratios[k]) : target;
     this.#jumped &&= !known[cell];
     this.#before = now;
     this.#eye = [...eye];
@@ -246,7 +251,8 @@ export class Light {
   paint({ gl, memory, means }, at, look, now) {
     const { white, light, probe, extras } = look;
     const { exposure, probes: { [probe]: mirrored } } = this;
-    gl.uniform1f(at.white, white * exposure);
+    gl.uniform1f(at.white, white);
+    gl.uniform3fv(at.exposure, exposure);
     /** Of codes: their mean, until levels are there. @type {(number: number, levels: number, mean: string, map: string, unit: number) => boolean} */
     const bind = (number, levels, mean, map, unit) => {
       const storage = number < 0 ? null : memory.of(number), there = storage && storage.levels >= levels;
@@ -254,7 +260,7 @@ export class Light {
       if (!there) return false;
       gl.activeTexture(gl.TEXTURE0 + unit);
       // A probe, whose other levels mix its parts, does not fade in.
-      const fading = storage.bind(true, true, levels ? Infinity : now);
+      const fading = storage.bind(true, true, levels ? Infinity : now, true);
       if (levels) gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
       gl.activeTexture(gl.TEXTURE0);
       gl.uniform1i(at[map], unit);
@@ -267,7 +273,7 @@ export class Light {
         this.#polish.set(look, (polish = [metallicFactor, roughnessFactor]));
       }
       gl.uniform2fv(at.polish, polish);
-      gl.uniform2f(at.power, mirrored.white * exposure, Math.max(mirrored.mean * exposure, 1e-30));
+      gl.uniform2f(at.power, mirrored.white, Math.max(mirrored.mean, 1e-30));
       for (const name of /** @type {const} */ (["centre", "low", "high"])) gl.uniform3fv(at[name], mirrored[name]);
       bind(probe, memory.rows[probe].sizes.length, "haze", "probe", 3);
     }
@@ -286,8 +292,8 @@ export class Light {
     gl.useProgram(program);
     gl.uniformMatrix3fv(at.turn, false, turn);
     gl.uniform4fv(at.lens, lens);
-    gl.uniform3fv(at.sky, sky.map((part) => part * exposure));
-    gl.uniform3fv(at.ground, ground.map((part) => part * exposure));
+    gl.uniform3fv(at.sky, sky.map((part, k) => part * exposure[k]));
+    gl.uniform3fv(at.ground, ground.map((part, k) => part * exposure[k]));
     gl.bindVertexArray(null);
     gl.depthFunc(gl.LEQUAL);
     gl.drawArrays(gl.TRIANGLES, 0, 3);

@@ -134,8 +134,9 @@ class EmitStage(Stage[None]):
 
     name = "emit"
     about = "Write the served files: cells and hints."
-    recipe = 14
+    recipe = 15
     changed = (
+        "the exposure of a cell balances its white; "
         "GLBs have normals of what is curved and reflects; "
         "portals that door leaves cover are marked as passages; GLBs are compressed; the "
         "hints hold the previews of textures, the errors and the "

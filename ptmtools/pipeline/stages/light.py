@@ -225,22 +225,27 @@ def _kind_of_light(baking: LightBaking) -> Mapping[str, Any]:
 
 
 def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, NDArray[np.float64]]:
-    """The factor of all light with which the building has the usual exposure, and (C,) the factors
-    of cells: some of what is seen from a cell is in its neighbours."""
+    """The factor of all light with which the building has the usual exposure, and (C, 3) those of
+    red, green and blue of cells: some of what is seen from a cell is in its neighbours."""
     import numpy as np
 
-    wanted, area = np.array([light.exposure for light in cell_lights]).reshape(-1, 2).T
+    from ptmtools.scene.colors import luminance
+
+    wanted = np.array([light.exposure for light in cell_lights]).reshape(-1, 3)
+    area = np.array([light.area for light in cell_lights])
     standing = area * (cells.standing if (area * cells.standing).any() else 1)
     if not standing.any():
-        return 1.0, np.ones(len(area))
-    usual = float((standing * wanted).sum() / standing.sum())
-    total, weight = wanted * area, area.copy()
+        return 1.0, np.ones((len(area), 3))
+    of_white = np.log(luminance(np.exp(wanted)))
+    usual = float((standing * of_white).sum() / standing.sum())
+    total, weight = wanted * area[:, None], area.copy()
     for cell, near in enumerate(cells.adjacent()):
         # A large hall beside a small room is seen through a door.
         beside = np.minimum(area[near], area[cell]) / 4
-        total[cell] += (wanted[near] * beside).sum()
+        total[cell] += (wanted[near] * beside[:, None]).sum(axis=0)
         weight[cell] += beside.sum()
-    wished = np.where(weight > 0, total / np.where(weight > 0, weight, 1), usual)
+    wished = np.full_like(wanted, usual)
+    wished[weight > 0] = total[weight > 0] / weight[weight > 0, None]
     return math.exp(usual), np.exp(np.clip(wished - usual, -_MOST_STOPS, _MOST_STOPS))
 
 
@@ -291,7 +296,7 @@ def _light_of(
     from ptmtools.light.model import Light
 
     scene, building = run[SCENE], baking.building
-    factor, exposure, probe_bytes = 1.0, np.ones(len(pieces)), 0
+    factor, exposure, probe_bytes = 1.0, np.ones((len(pieces), 3)), 0
     horizon, shine = np.zeros((2, 3)), np.zeros((len(scene.materials), 3))
     reflects, probes = np.zeros(len(geometry.object), np.bool_), np.zeros((len(pieces), 11))
     if building is not None:
@@ -331,8 +336,8 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 6
-    changed = "glossy surfaces and panes have reflections; pictures have true colours"
+    recipe = 7
+    changed = "the hue of the light of a room counts half or less: white is balanced"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")

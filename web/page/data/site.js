@@ -55,7 +55,7 @@ import { levelSizes } from "../../client/src/levels.js";
  * @property {string} name
  * @property {number[]} box
  * @property {boolean} [standing]
- * @property {number} [exposure] of the picture that is seen from it
+ * @property {number[]} [exposure] of red, green and blue in the picture that is seen from it
  * @property {string} record
  * @property {string} geometry
  * @property {number} recordBytes
@@ -99,7 +99,7 @@ import { levelSizes } from "../../client/src/levels.js";
  */
 
 /** The schema of the index that this page reads. */
-const SCHEMA = 2;
+const SCHEMA = 3;
 
 /** @returns {SiteConfig} */
 export function readConfig() {
@@ -124,7 +124,7 @@ export class Site {
       throw new Error("a view of no place");
     }
     const { light: { stops = 1, sky = [], ground = [] } = {}, cells } = index;
-    const bright = [stops, ...sky, ...ground, ...cells.map(({ exposure = 1 }) => exposure)];
+    const bright = [stops, ...sky, ...ground, ...cells.flatMap(({ exposure: [r, g, b] = [1, 1, 1] }) => [r, g, b])];
     if (!bright.every((number) => number >= 0 && number < Infinity)) throw new Error("light of no brightness");
     this.index = index;
     this.address = address;

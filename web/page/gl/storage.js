@@ -44,9 +44,6 @@ export class Storage {
     gl.texStorage2D(gl.TEXTURE_2D, sizes.length, formats(gl, channels).inside, width, height);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
-    // As smooth edges, it costs too much without a graphics card.
-    const slanted = gl.getContextAttributes()?.antialias && gl.getExtension("EXT_texture_filter_anisotropic");
-    if (slanted) gl.texParameterf(gl.TEXTURE_2D, slanted.TEXTURE_MAX_ANISOTROPY_EXT, SLANT);
   }
 
   get levels() {
@@ -88,8 +85,9 @@ export class Storage {
    * @param {boolean} clampU
    * @param {boolean} clampV
    * @param {number} now s
+   * @param {boolean} [chart] whether it has parts that do not belong together
    */
-  bind(clampU, clampV, now) {
+  bind(clampU, clampV, now, chart) {
     const { gl } = this, wrap = +clampU + 2 * +clampV;
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     if (wrap !== this.#wrap) {
@@ -97,6 +95,10 @@ export class Storage {
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, s);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, t);
       this.#wrap = wrap;
+      // As smooth edges, it costs too much without a graphics card.
+      const card = !chart && gl.getContextAttributes()?.antialias;
+      const slanted = card && gl.getExtension("EXT_texture_filter_anisotropic");
+      if (slanted) gl.texParameterf(gl.TEXTURE_2D, slanted.TEXTURE_MAX_ANISOTROPY_EXT, SLANT);
     }
     if (!this.#fading) return false;
     const left = this.#fading * Math.max(0, 1 - (now - this.#since) / FADE);

@@ -66,7 +66,7 @@ export class CellLoader {
    * @param {(texture: number) => Omit<Mirrored, "metallic" | "roughness"> | null} [probeOf] returns the probe with a
    *   number in the index; without it nothing reflects
    */
-  constructor(textureOf, light = LIGHT, exposure = { value: 1 }, probeOf = () => null) {
+  constructor(textureOf, light = LIGHT, exposure = { value: [1, 1, 1] }, probeOf = () => null) {
     this.#textureOf = textureOf;
     this.#probeOf = probeOf;
     this.#light = light;

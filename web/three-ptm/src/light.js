@@ -14,7 +14,7 @@ import { BufferAttribute, BufferGeometry, Mesh, ShaderMaterial } from "three";
  * @property {number[]} [sky] radiance of the background, with "neutral"
  * @property {number[]} [ground]
  */
-/** @typedef {{value: number}} Exposure a uniform */
+/** @typedef {{value: number[]}} Exposure a uniform: factors of red, green and blue */
 /**
  * A panorama of light, as seen from a point of a cell.
  * @typedef {{white: number, mean: number, centre: number[], low: number[], high: number[]}} Probe
@@ -157,7 +157,7 @@ export function glaze(material, { stops, tone }, exposure, mirrored) {
   material.onBeforeCompile = (shader) => {
     Object.assign(shader.uniforms, { exposure });
     mirror(shader, mirrored);
-    const head = `uniform float exposure;\n${developed(tone)}${ENCODED}${reflections(stops)}`;
+    const head = `uniform vec3 exposure;\n${developed(tone)}${ENCODED}${reflections(stops)}`;
     shader.fragmentShader = head + shader.fragmentShader.replace("#include <premultiplied_alpha_fragment>", GLASS);
   };
   material.customProgramCacheKey = () => `glass ${stops} ${tone}`;
@@ -179,7 +179,7 @@ export function illuminate(material, white, { stops, tone }, exposure, mirrored)
     Object.assign(shader.uniforms, { white: { value: white }, exposure });
     if (mirrored) mirror(shader, mirrored);
     const shown = mirrored ? "reflected(diffuseColor.rgb, received * white)" : "gl_FragColor.rgb * white";
-    const head = `uniform float white;\nuniform float exposure;\n${developed(tone)}${mirrored ? reflections(stops) : ""}`;
+    const head = `uniform float white;\nuniform vec3 exposure;\n${developed(tone)}${mirrored ? reflections(stops) : ""}`;
     const codes = "exp2(float(" + stops + ") * (lightMapTexel.rgb - 1.0))";
     shader.fragmentShader = head + shader.fragmentShader
       .replace("#include <aomap_fragment>", `
@@ -216,7 +216,7 @@ void main() {
 varying vec3 way;
 uniform vec3 sky;
 uniform vec3 ground;
-uniform float exposure;
+uniform vec3 exposure;
 ${developed(tone)}
 void main() {
   float share = smoothstep(-0.02, 0.02, normalize(way).y);
@@ -233,11 +233,13 @@ void main() {
 /**
  * Eases an exposure to another one, or sets it at once for visitors who ask for less motion.
  * @param {Exposure} exposure
- * @param {number} target
+ * @param {number[]} target
  * @param {number} seconds since the last time
  */
 export function ease(exposure, target, seconds) {
   const still = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)").matches;
-  const ratio = still ? 1 : (exposure.value / target) ** Math.exp(-seconds / EASE);
-  exposure.value = Math.abs(Math.log(ratio)) < UNSEEN ? target : target * ratio;
+  const left = still ? 0 : Math.exp(-seconds / EASE);
+  const ratios = target.map((part, k) => (exposure.value[k] / part) ** left);
+  const seen = ratios.some((ratio) => Math.abs(Math.log(ratio)) > UNSEEN);
+  exposure.value = seen ? target.map((part, k) => part * ratios[k]) : target;
 }

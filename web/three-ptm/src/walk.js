@@ -23,7 +23,7 @@ import { RangeFile } from "./range-file.js";
  *   components?: number, offsets?: number[], previews?: {file: string, level: number, width: number,
  *   height: number, bytes: number, exact?: boolean}[], light?: number, relief?: string,
  *   normals?: boolean, probe?: import("./light.js").Probe}[]} textures
- * @property {{name: string, box: number[], record?: string, geometry?: string, exposure?: number}[]} cells
+ * @property {{name: string, box: number[], record?: string, geometry?: string, exposure?: number[]}[]} cells
  * @property {import("./light.js").Light} [light]
  * @property {{cell: number, files: string[]}[]} [meshes] objects with levels of detail
  */
@@ -77,7 +77,7 @@ export class Walk {
   #ownWorkers;
   #loader;
   /** That of lit surfaces; where the viewer was, and when, ms; and whether by a jump to an unknown cell. */
-  #exposure = { value: 1 };
+  #exposure = { value: [1, 1, 1] };
   #place = [Infinity];
   #before = 0;
   #jumped = true;
@@ -113,7 +113,7 @@ export class Walk {
    * @param {WalkOptions} [options]
    */
   constructor(renderer, index, url, options = {}) {
-    if (index.schema !== 2) throw new Error(`hints of schema ${index.schema}, not 2`);
+    if (index.schema !== 3) throw new Error(`hints of schema ${index.schema}, not 3`);
     this.index = index;
     this.budget = options.budget ?? 2 ** 28;
     /** Sky and ground of a building with light, to be added to a scene; or null. */
@@ -127,14 +127,14 @@ export class Walk {
     this.#ownWorkers = options.workers ? undefined : new DecoderWorkers();
   }
 
-  /** Factor of all light in the picture. */
+  /** Factors of red, green and blue light in the picture. */
   get exposure() {
     return this.#exposure.value;
   }
 
   /** The exposure of the viewer's cell; of an eye in none, as it is. */
   get #target() {
-    return this.cell < 0 ? this.exposure : (this.index.cells[this.cell].exposure ?? 1);
+    return this.cell < 0 ? this.exposure : (this.index.cells[this.cell].exposure ?? [1, 1, 1]);
   }
 
   /** Bytes of all textures on the GPU. */
