@@ -8,8 +8,8 @@ light pass but for their opacity. Ceilings that glow by default light, but do no
 is traced in passes, and Open Image Denoise removes grain, until the standard error of the displayed
 picture is at most ``--noise`` of 255, or there are as many passes as `_PASSES` allows.
 
-Exposure takes the mean of the reference's log luminance to `KEY`; then come the curve Khronos PBR
-Neutral and sRGB. Pictures of ``ptm render`` have twice the size, and 2 × 2 pixels are averaged:
+The reference has the exposure that is best for each picture, and white balanced as in the picture's
+cell; then come the curve Khronos PBR Neutral and sRGB. Pictures of ``ptm render`` have twice the size, and 2 × 2 pixels are averaged:
 a reference of that size would take four times as long. *matt* is the same reference with all
 surfaces diffuse, beside the picture without reflections: the part of the difference that is light
 alone. The tables give the root mean square of 255 and FLIP, and the noise of the references;
@@ -45,7 +45,7 @@ from scenes import ROOT, model_file
 from ptmtools.arrays import Floats, Singles
 from ptmtools.output.served import Served, read_served
 from ptmtools.rendering.drawing import ViewOptions, draw_view
-from ptmtools.rendering.tone import neutral
+from ptmtools.rendering.tone import neutral, tone_at
 from ptmtools.scene.colors import luminance, to_linear, to_srgb
 from ptmtools.scene.model import Material
 from ptmtools_lab.measures import flip
@@ -102,6 +102,13 @@ def exposure_like(light: Floats, picture: Floats) -> float:
         tries = [best * ratio**k for k in range(-4, 5)]
         best = min(tries, key=lambda factor: rms(displayed(light, factor), picture))
     return best
+
+
+def balance_of(database: Served, view: EyeView) -> Floats:
+    """(3,) factors that balance white where a picture is drawn; a display of either light."""
+    tone = tone_at(database, np.array(view.eye))
+    factors = tone.exposure if tone else np.ones(3)
+    return np.asarray(factors / luminance(factors))
 
 
 class PathTracer:
@@ -398,7 +405,9 @@ def compare(name: str, given: argparse.Namespace) -> None:
         row, beside = [], []
         for database in served.values():
             shown, plain = render(database, view, size)
-            pairs = [(all_light, shown), (all_light, plain), (matt_light, plain)]
+            whites = balance_of(database, view)
+            pairs = [(all_light * whites, shown), (all_light * whites, plain)]
+            pairs.append((matt_light * whites, plain))
             truths = [displayed(light, exposure_like(light, picture)) for light, picture in pairs]
             row += [
                 (rms(truth, picture), flip(truth, picture))
