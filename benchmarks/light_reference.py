@@ -9,11 +9,11 @@ is traced in passes, and Open Image Denoise removes grain, until the standard er
 picture is at most ``--noise`` of 255, or there are as many passes as `_PASSES` allows.
 
 The reference has the exposure that is best for each picture, and white balanced as in the picture's
-cell; then come the curve Khronos PBR Neutral and sRGB. Pictures of ``ptm render`` have twice the size, and 2 × 2 pixels are averaged:
-a reference of that size would take four times as long. *matt* is the same reference with all
-surfaces diffuse, beside the picture without reflections: the part of the difference that is light
-alone. The tables give the root mean square of 255 and FLIP, and the noise of the references;
-pictures lie beside each other in ``--out``.
+cell; then come the curve Khronos PBR Neutral and sRGB. Pictures of ``ptm render`` have twice the
+size, and 2 × 2 pixels are averaged: a reference of that size would take four times as long. *matt*
+is the same reference with all surfaces diffuse, beside the picture without reflections: the part of
+the difference that is light alone. The tables give the root mean square of 255 and FLIP, and the
+noise of the references; pictures lie beside each other in ``--out``.
 
 Needs ``mitsuba`` and ``pyoidn`` (extra ``reference``). Mitsuba's compiled variant is used where
 ``DRJIT_LIBLLVM_PATH`` names LLVM 16 or later (Debian: ``apt install libllvm19``); else the scalar

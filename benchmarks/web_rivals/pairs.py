@@ -1,13 +1,13 @@
 """Pairs of pictures for a judge who does not know which is whose.
 
-    python benchmarks/pairs.py three MODEL … --out FOLDER [--views 2]
-    python benchmarks/pairs.py PTM MODEL … --out FOLDER [--views 2]
+    python -m benchmarks.web_rivals.pairs three MODEL … --out FOLDER [--views 2]
+    python -m benchmarks.web_rivals.pairs PTM MODEL … --out FOLDER [--views 2]
 
 Builds each model with all defaults, and shows the first viewpoints of the database: as `ptm render`
-draws it beside ``three``, a page of three.js (`web_rivals/pages/lit.js`), or beside the picture of
+draws it beside ``three``, a page of three.js (`pages/lit.js`), or beside the picture of
 another release, by its program ``PTM`` with its own database. Each pair is a PNG, left and right
-as drawn by lot; ``key.json`` says which side is ours. ``--count KEY ANSWERS`` compares it with a
-judge's file of lines "PAIR left|right|same".
+as drawn by lot; ``key.json``, which later models are added to, says which side is ours.
+``--count KEY ANSWERS`` compares it with a judge's file of lines "PAIR left|right|same".
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / name) for name in ("benchmarks", "tests/e2e", "")]
 
 from render import load  # noqa: E402
@@ -53,9 +53,11 @@ def main() -> None:
         print(dict(count(*given.count)))
         return
     given.out.mkdir(parents=True, exist_ok=True)
-    lot, key = random.Random(given.seed), dict[str, str]()
+    file = given.out / "key.json"
+    key: dict[str, str] = json.loads(file.read_text("utf-8")) if file.exists() else {}
     ours = str(Path(sys.executable).with_name("ptm"))
     for model in given.models:
+        lot = random.Random(f"{given.seed} {model.stem} {given.rival}")
         database = build(ours, model, given.out, "ours")
         views = views_of(database)[: given.views]
         pictures = [draw(ours, database, view, given.out) for view in views]
@@ -69,7 +71,7 @@ def main() -> None:
             key[name] = "left" if left else "right"
             both = (picture, rival) if left else (rival, picture)
             Image.fromarray(np.concatenate(both, axis=1)).save(given.out / f"{name}.png")
-        (given.out / "key.json").write_text(json.dumps(key, indent=1) + "\n", "utf-8")
+        file.write_text(json.dumps(key, indent=1) + "\n", "utf-8")
         print(f"{model.stem}: {len(views)} pairs", flush=True)
 
 
