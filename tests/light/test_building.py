@@ -180,6 +180,23 @@ def test_extremes_give_numbers(
     assert result.texels.max() > 200
 
 
+@pytest.mark.parametrize("walls", [(0.8, 0.3, 0.3), (0.5, 0.5, 0.5), (0.3, 0.3, 0.8)])
+def test_white_is_balanced(walls: tuple[float, float, float]) -> None:
+    """Walls of a colour: the exposure takes most of the hue of their light away, and no more."""
+    corner = room()
+    albedo = np.tile(walls, (len(corner), 1))
+    building = lit(corner, None, albedo)
+    grey = np.full(len(corner), 0.5, np.float32)
+    result = LightBaking(OPTIONS, building, None, grey).light(piece(corner))
+    assert result.texels is not None
+    light = coded_light(result.texels, result.white).reshape(-1, 3)
+    before = np.diff(np.log(light).mean(axis=0))
+    after = before + np.diff(result.exposure)
+    np.testing.assert_allclose(after, 0.3 * before, atol=0.03)
+    strength = np.abs(before).max()
+    assert strength < 0.1 if len(set(walls)) == 1 else strength > 0.3
+
+
 def test_a_pane_is_no_surface_of_the_light() -> None:
     corner = room()
     glass: CellSurfaces = replace(piece(corner), glass=np.ones(len(corner), np.bool_))
