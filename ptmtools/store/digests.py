@@ -17,6 +17,7 @@ import json
 import os
 import time
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -119,9 +120,12 @@ def cache_folder(kind: str) -> Path | None:
     return caches / "ptmtools" / kind if caches.is_absolute() else None
 
 
+@cache
 def _forget_old(folder: Path) -> None:
+    """Once in a process: there may be thousands of files."""
     oldest = time.time() - KEPT_DAYS * 86_400
-    for file in folder.glob("*.json"):
-        with suppress(OSError):
-            if file.stat().st_mtime < oldest:
-                file.unlink()
+    with os.scandir(folder) as files:
+        for file in files:
+            with suppress(OSError):
+                if file.name.endswith(".json") and file.stat().st_mtime < oldest:
+                    os.unlink(file)
