@@ -52,6 +52,14 @@ def one_processor() -> Iterator[Callable[[], int]]:
         yield count
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_waiting_for_the_disk() -> Iterator[None]:
+    """A build waits for the disk forty times, and no test switches the power off."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda file: None)
+        yield
+
+
 @pytest.fixture(scope="session")
 def require() -> Callable[[str, str], None]:
     """``require(what, remedy)``: report a missing component (skip, or fail with CI=true)."""
