@@ -29,6 +29,7 @@ from benchmarks.fuzz.soup import write_materials
 from ptmtools.cells import Cells, SubdivideOptions
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError
+from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.encoding import TextureOptions
 from ptmtools.pipeline.validation import shoot_segments, validate
@@ -85,7 +86,7 @@ class Facts:
 class Building:
     """Models of one base, as `Target`; its outcomes are those of `Outcome`.
 
-    ``fault``: one of `FAULTS`, planted into the toolchain.
+    ``fault``: one of `FAULTS`, planted into the toolchain. ``light``: whether light is baked.
     """
 
     limit = 1 << 29
@@ -93,8 +94,11 @@ class Building:
     #: Kernels that were compiled earlier are read from their cache.
     allowed = ("pickle.find_class",)
 
-    def __init__(self, folder: Path, outside: Path, *, base: str, fault: str = "") -> None:
+    def __init__(
+        self, folder: Path, outside: Path, *, base: str, fault: str = "", light: bool = True
+    ) -> None:
         self._folder = folder
+        self._light = LightOptions("auto" if light else "none")
         self._base = base
         self._fault = FAULTS[fault] if fault else None
         write_materials(folder)
@@ -117,7 +121,7 @@ class Building:
             if self._fault:
                 self._fault(planted, database)
             try:
-                build_scene(model, database, *options(facts), workers=1)
+                build_scene(model, database, *options(facts), self._light, workers=1)
             except InputError as error:
                 if error.code not in documented_codes() or error.code == "PTM-L099":
                     raise

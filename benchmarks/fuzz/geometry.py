@@ -117,9 +117,11 @@ def main() -> None:
     sys.exit(bool(findings))
 
 
-def fuzz(base: str, seed: int, start: int, count: int, jobs: int = 1, fault: str = "") -> Summary:
-    """Builds inputs of a base, and some of them twice; ``fault`` as for `Building`."""
-    make = partial(Building, base=base, fault=fault)
+def fuzz(
+    base: str, seed: int, start: int, count: int, jobs: int = 1, **planted: str | bool
+) -> Summary:
+    """Builds inputs of a base, and some of them twice; ``planted``: as for `Building`."""
+    make = partial(Building, base=base, **planted)
     summary = run(base, make, seed, start, count, jobs, SLOW, HANGS)
     again = run(base, make, seed, start, -(-count // TWICE), 1, SLOW, HANGS)
     first, second = (databases(each) for each in (summary, again))

@@ -261,7 +261,8 @@ def test_three_js_shows_objects_as_modelled(
     """The files of a cell's objects follow it, and none of the simplified meshes stays."""
     folder = tmp_path_factory.mktemp("statues")
     model = write_rooms(folder / "model", 5)
-    assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
+    build = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]
+    assert main([*build, "--light", "none"]) == 0
     www = folder / "db" / "www"
     rows = read(www, "hints.json")["meshes"]
     assert len(rows) == 2

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ptmtools.cli.main import main
 from ptmtools.output.gltf import unpack
 from ptmtools.texture.images.png import png_bytes
 from tests.e2e.conftest import Ptm
@@ -46,21 +47,22 @@ def served(db: Path) -> dict[str, bytes]:
     return {p.relative_to(www).as_posix(): p.read_bytes() for p in www.rglob("*") if p.is_file()}
 
 
-@pytest.fixture
-def built(ptm: Ptm, tmp_path: Path) -> dict[str, Path]:
-    made = {}
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Databases with light; few rays show whether one surface is lit otherwise."""
+    folder, made = tmp_path_factory.mktemp("built"), {}
     for name, pixels, mode in (
         ("plain", COLORS, None),
         ("opaque", CLEAR, "OPAQUE"),
         ("default", CLEAR, None),
         ("blend", CLEAR, "BLEND"),
     ):
-        path = tmp_path / name / "house.glb"
+        path = folder / name / "house.glb"
         path.parent.mkdir()
         path.write_bytes(model(pixels, mode))
         made[name] = path.with_name("house.db")
-        done = ptm("build-scene", path, "-o", made[name])
-        assert (done.status, done.err) == (0, "")
+        options = ["-o", str(made[name]), "--light-samples", "4"]
+        assert main(["-q", "build-scene", str(path), *options]) == 0
     return made
 
 

@@ -34,8 +34,8 @@ def build(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[...
 
     def of(*more: str) -> Path:
         database = tmp_path_factory.mktemp("built") / "db"
-        options = ["-q", "build-scene", str(model), "-o", str(database), "-j", "1", *more]
-        assert main(options) == 0
+        options = ["-o", str(database), "-j", "1", "--light", "none", *more]
+        assert main(["-q", "build-scene", str(model), *options]) == 0
         return database
 
     return of
@@ -169,7 +169,8 @@ def test_objects_whose_seams_leave_nothing_to_simplify(tmp_path: Path) -> None:
     file = tmp_path / "model" / "two_rooms.obj"
     file.write_text("\n".join(lines) + "\n")
     database = tmp_path / "db"
-    assert main(["-q", "build-scene", str(file), "-o", str(database), "-j", "1"]) == 0
+    options = ["-o", str(database), "-j", "1", "--light", "none"]
+    assert main(["-q", "build-scene", str(file), *options]) == 0
     assert meshes_of(database) == []
 
 
