@@ -18,6 +18,7 @@ from tests.scene.ifc.ifc_house import STOREY, THICK, WIDE, Ifc, house
 #: In world metres: Y up, the middle of the building's floor at the origin, the lowest floor 0.2 m
 #: above.
 EYE = THICK + 1.6
+DARK = ("--light", "none")
 WEST, EAST = -(WIDE + THICK) / 2, (WIDE + THICK) / 2
 
 
@@ -70,14 +71,14 @@ def test_a_house(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
 
 def test_open_doors(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
     db = tmp_path / "house.db"
-    assert ptm("build-scene", ifc, "-o", db, "--doors", "open").status == 0
+    assert ptm("build-scene", ifc, "-o", db, "--doors", "open", *DARK).status == 0
     rooms = read_cells(db).locate(np.array([[WEST, EYE, 0], [EAST, EYE, 0]])).tolist()
     assert sees(db, *rooms)
 
 
 def test_closed_doors(ptm: Ptm, ifc: Path, tmp_path: Path) -> None:
     db = tmp_path / "house.db"
-    assert ptm("build-scene", ifc, "-o", db, "--doors", "closed", "--json").status == 0
+    assert ptm("build-scene", ifc, "-o", db, "--doors", "closed", *DARK).status == 0
     rooms = read_cells(db).locate(np.array([[WEST, EYE, 0], [EAST, EYE, 0]])).tolist()
     assert min(rooms) >= 0
     assert not sees(db, *rooms)

@@ -133,6 +133,7 @@ def test_a_walk_from_nothing_but_the_wheel(python: Path, tmp_path: Path) -> None
     assert "museum.obj: Wavefront OBJ" in run(ptm, "info", "museum/museum.obj", cwd=tmp_path)
     run(ptm, "sample", "two-rooms", cwd=tmp_path)
     model = ("two_rooms/two_rooms.obj", "--profile", "raw", "-j", "1")
+    model += ("--light", "bake", "--light-density", "0.5", "--light-samples", "1")
     assert "two_rooms.db" in run(ptm, "build-scene", *model, cwd=tmp_path)
     server = subprocess.Popen(
         [ptm, "serve", "two_rooms/two_rooms.db", "--port", "0"],

@@ -28,6 +28,7 @@ from ptmtools.texture.images.png import png_bytes
 from tests.conftest import files_below
 from tests.e2e.conftest import make_museum
 from tests.parallel.urls import (
+    DIM,
     EMBREE,
     FAST,
     built_here,
@@ -92,6 +93,7 @@ def test_workers_that_share_no_folder(
             f"s3://{bucket}/models/{model.name}",
             f"s3://{bucket}/museum.db",
             EMBREE,
+            DIM,
             scheduler=cluster.scheduler_address,
             progress=progress,
         )
@@ -135,17 +137,17 @@ def test_an_update_sends_what_changed_and_removes_the_rest(
     monkeypatch.setattr(lists, "INLINE", inline)
     monkeypatch.setattr(lists, "MEAN", 4)
     url = f"s3://{bucket}/db"
-    report = build_scene(rooms, url, EMBREE, FAST, workers=1)
+    report = build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     assert report.database == url
     before = manifest_of(store, bucket, "db").files()
     assert objects_of(store, bucket, "db") == set(before.values())
     store.requests.clear()
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     assert store.written(bucket) == []
     machine()  # which has no copy yet
     (rooms.parent / "floor.png").write_bytes(png_bytes(np.zeros((8, 8, 3), np.uint8)))
     store.requests.clear()
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     after = manifest_of(store, bucket, "db").files()
     new = {f"db/objects/{digest}" for digest in set(after.values()) - set(before.values())}
     written = store.written(bucket)
@@ -163,14 +165,14 @@ def test_an_interrupted_build_leaves_the_former_database(
     machine: Callable[[], Path],
 ) -> None:
     url = f"s3://{bucket}/db"
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     before = manifest_of(store, bucket, "db")
     (rooms.parent / "floor.png").write_bytes(png_bytes(np.zeros((8, 8, 3), np.uint8)))
     monkeypatch.setattr(
         store, "refuse", lambda request: request.method == "PUT" and MANIFEST in request.path
     )
     with pytest.raises(OutputError, match="PTM-O012"):
-        build_scene(rooms, url, EMBREE, FAST, workers=1)
+        build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     assert manifest_of(store, bucket, "db") == before
     assert set(before.outputs().values()) <= objects_of(store, bucket, "db")
     monkeypatch.setattr(store, "refuse", lambda request: False)
@@ -179,7 +181,7 @@ def test_an_interrupted_build_leaves_the_former_database(
     assert former.manifest == before
     assert former.first_damage(before.files()) is None
     store.requests.clear()
-    report = build_scene(rooms, url, EMBREE, FAST, workers=1)
+    report = build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     # The copy was ahead: nothing is computed or sent again.
     assert not any(stage.ran for stage in report.stages)
     assert store.written(bucket) == [f"db/{MANIFEST}"]
@@ -202,7 +204,7 @@ def test_two_machines_alternate(
 
     def build(at: Path, *options: Any) -> None:
         monkeypatch.setenv("XDG_CACHE_HOME", str(at))
-        build_scene(rooms, url, EMBREE, FAST, *options, workers=1)
+        build_scene(rooms, url, EMBREE, DIM, FAST, *options, workers=1)
 
     build(one)
     painted(rooms, "floor.png", 80)
@@ -218,13 +220,13 @@ def test_local_processes_encode_images_of_the_url(
     store: Store, bucket: str, tmp_path: Path, machine: Callable[[], Path]
 ) -> None:
     model, url = make_museum(tmp_path / "model", size=64), f"s3://{bucket}/db"
-    build_scene(model, url, EMBREE, FAST, workers=1)
+    build_scene(model, url, EMBREE, DIM, FAST, workers=1)
     machine()
     other = TextureOptions(fallback=False, max_side=32)
-    build_scene(model, url, EMBREE, other, SubdivideOptions(wall_area=1.5), workers=3)
+    build_scene(model, url, EMBREE, DIM, other, SubdivideOptions(wall_area=1.5), workers=3)
     machine()
     here = tmp_path / "here"
-    build_scene(model, here, EMBREE, other, SubdivideOptions(wall_area=1.5), workers=1)
+    build_scene(model, here, EMBREE, DIM, other, SubdivideOptions(wall_area=1.5), workers=1)
     assert files_below(fetch_database(url)) == files_below(here)
 
 
@@ -233,12 +235,12 @@ def test_later_stages_read_what_they_need(
 ) -> None:
     """On another machine, with served files that need the heads and bytes of textures."""
     url = f"s3://{bucket}/db"
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     machine()
     store.requests.clear()
     (rooms.parent / "floor.png").write_bytes(png_bytes(np.zeros((8, 8, 3), np.uint8)))
     options = EmitOptions(format="vrml,gltf,interlace", first_look=16)
-    build_scene(rooms, url, EMBREE, FAST, options, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, options, workers=1)
     outputs = manifest_of(store, bucket, "db").outputs()
     read = {r.path.rpartition("/")[2] for r in store.requests if r.method == "GET"}
     cells = {digest for name, digest in outputs.items() if name.startswith("www/cells/")}
@@ -261,9 +263,9 @@ def test_two_builds_at_a_time(
     url = f"s3://{bucket}/db"
     slow = RemoteDatabase(url)
     slow.fetch(new=True)
-    build_scene(rooms, slow.folder, EMBREE, FAST, workers=1)
+    build_scene(rooms, slow.folder, EMBREE, DIM, FAST, workers=1)
     machine()
-    build_scene(rooms, url, EMBREE, TextureOptions(), workers=1)
+    build_scene(rooms, url, EMBREE, DIM, TextureOptions(), workers=1)
     first = manifest_of(store, bucket, "db")
     if checked_by == "store":
         info = Objects.info

@@ -20,6 +20,7 @@ from ptmtools.texture.images.png import png_bytes
 from tests.conftest import files_below
 from tests.e2e.conftest import Ptm, ptm
 from tests.parallel.urls import (
+    DIM,
     EMBREE,
     FAST,
     built_here,
@@ -52,16 +53,16 @@ def test_a_refused_manifest_with_lists(
         return bool(request.method == "PUT" and MANIFEST in request.path)
 
     if not first:
-        build_scene(rooms, url, EMBREE, FAST, workers=1)
+        build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
         painted(rooms, "floor.png", 80)
     with monkeypatch.context() as patch:
         patch.setattr(store, "refuse", refused)
         with pytest.raises(OutputError, match="PTM-O012"):
-            build_scene(rooms, url, EMBREE, FAST, workers=1)
+            build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     (rooms.parent / "floor.png").write_bytes(plain)
     if first:
         machine()
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     machine()
     assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST)
 
@@ -78,7 +79,7 @@ def test_a_list_that_is_lost_at_the_url(
 ) -> None:
     few_in_lists(monkeypatch)
     url = f"s3://{bucket}/db"
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     lists_of = {n: r.list_files() for n, r in manifest_of(store, bucket, "db").stages.items()}
     shared = {d for stage, own in lists_of.items() if stage != "emit" for d in own.values()}
     digest = min(set(lists_of["emit"].values()) - shared)
@@ -92,7 +93,7 @@ def test_a_list_that_is_lost_at_the_url(
         fetch_database(url)
     assert raised.value.file == f"{url}/objects/{digest}"
     store.client().delete_object(**key)
-    report = build_scene(rooms, url, EMBREE, FAST, workers=1)
+    report = build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     assert [stage.stage for stage in report.stages if stage.ran] == ["emit"]
     machine()
     assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST)
@@ -133,7 +134,7 @@ def test_other_stores(
             image = png_bytes(np.zeros((size, size, 3), np.uint8))
             (rooms.parent / "floor.png").write_bytes(image)
             machine()
-            build_scene(rooms, url, EMBREE, FAST, workers=1)
+            build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
         machine()
         actual = files_below(fetch_database(url))
     assert actual == built_here(rooms, tmp_path / "here", FAST)
@@ -167,7 +168,7 @@ def test_a_model_is_fetched_once(
 
 def test_urls_of_files_are_paths(rooms: Path, tmp_path: Path, ptm: Ptm) -> None:
     url = f"file://{tmp_path}/a.db"
-    build_scene(f"file://{rooms}", url, EMBREE, FAST, workers=1)
+    build_scene(f"file://{rooms}", url, EMBREE, DIM, FAST, workers=1)
     assert files_below(tmp_path / "a.db") == built_here(rooms, tmp_path / "here", FAST)
     assert ptm("validate", url).status == 0
 
@@ -200,7 +201,7 @@ def test_a_damaged_object_is_an_error(
     store: Store, bucket: str, rooms: Path, machine: Callable[[], Path]
 ) -> None:
     url = f"s3://{bucket}/db"
-    build_scene(rooms, url, EMBREE, FAST, workers=1)
+    build_scene(rooms, url, EMBREE, DIM, FAST, workers=1)
     digest = min(objects_of(store, bucket, "db"))
     store.client().put_object(Bucket=bucket, Key=f"db/objects/{digest}", Body=b"x")
     machine()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.coverage.options import AchOptions
+from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.encoding import TextureOptions
 from ptmtools.store import lists
@@ -21,11 +22,13 @@ from tests.conftest import files_below
 from tests.stores import Store
 
 EMBREE = AchOptions(backend="embree")
+#: Files with light, of few rays.
+DIM = LightOptions(light_samples=4)
 FAST = TextureOptions(fallback=False)
 
 
 def built_here(model: Path, folder: Path, *options: Any) -> dict[str, bytes]:
-    build_scene(model, folder, EMBREE, *options, workers=1)
+    build_scene(model, folder, EMBREE, DIM, *options, workers=1)
     return files_below(folder)
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from ptmtools import jit
 from ptmtools.cli.main import main
+from ptmtools.light.options import LightOptions
 from ptmtools.output.served import read_served
 from ptmtools.pipeline.build import build_scene
 from ptmtools.pipeline.stages import CELLS
@@ -39,7 +40,7 @@ def called(monkeypatch: pytest.MonkeyPatch) -> set[str]:
 def test_all_kernels_are_called(shared: Path, tmp_path: Path, called: set[str]) -> None:
     """Of a build, of its check, of a view, and of an image in each profile."""
     gallery, db = shared / "scenes" / "gallery" / "gallery.obj", tmp_path / "a.db"
-    build_scene(gallery, db, workers=1)
+    build_scene(gallery, db, LightOptions(light_samples=4), workers=1)
     assert not validate(db).errors
     for lit in (False, True):
         draw_view(read_served(db), ViewOptions(width=32, height=18, lit=lit))

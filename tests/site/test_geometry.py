@@ -26,7 +26,8 @@ def cells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[bytes]]:
     result = {}
     for form, options in {"compressed": [], "plain": ["--plain-gltf"]}.items():
         db = folder / f"{form}.db"
-        assert main(["-q", "build-scene", str(model), "-o", str(db), "-j", "1", *options]) == 0
+        words = ["-o", str(db), "-j", "1", "--light-samples", "4", *options]
+        assert main(["-q", "build-scene", str(model), *words]) == 0
         result[form] = [path.read_bytes() for path in sorted((db / "www/gltf").iterdir())]
     return result
 

@@ -139,13 +139,23 @@ def test_names_of_outputs(db: Path, name: str) -> None:
     }
 
 
+QUICK = ("--backend", "embree", "-j", "1", "--light", "none")
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a model and its database."""
+    folder = tmp_path_factory.mktemp("built")
+    shutil.copytree(TWO_ROOMS, folder / "model")
+    build = ["-q", "build-scene", str(folder / "model/two_rooms.obj"), "-o", str(folder / "db")]
+    assert main([*build, *QUICK, "--samples", "16"]) == 0
+    return folder
+
+
 @pytest.mark.parametrize("inner", ["www", "www/cells", "www/gltf", "www/hints"])
-def test_links_where_cells_are_to_be_written(tmp_path: Path, inner: str) -> None:
+def test_links_where_cells_are_to_be_written(built: Path, tmp_path: Path, inner: str) -> None:
     """What an interrupted run has finished is kept, and with it whatever lies beside it."""
-    shutil.copytree(TWO_ROOMS, tmp_path / "model")
-    build = ["-q", "build-scene", str(tmp_path / "model/two_rooms.obj"), "-o", str(tmp_path / "db")]
-    options = ["--samples", "16", "--backend", "embree", "-j", "1"]
-    assert main([*build, *options]) == 0
+    shutil.copytree(built, tmp_path, dirs_exist_ok=True)
     begun = tmp_path / "db/.ptm-new/emit"
     begun.mkdir(parents=True)
     task = {"task": "ab" * 32, "outputs": {"www/x": "ab" * 32}}
@@ -153,7 +163,8 @@ def test_links_where_cells_are_to_be_written(tmp_path: Path, inner: str) -> None
     (tmp_path / "outside").mkdir()
     (begun / inner).parent.mkdir(parents=True, exist_ok=True)
     (begun / inner).symlink_to(tmp_path / "outside")
-    assert main([*build, *options, "--samples", "32"]) == 4
+    build = ["-q", "build-scene", str(tmp_path / "model/two_rooms.obj"), "-o", str(tmp_path / "db")]
+    assert main([*build, *QUICK, "--samples", "32"]) == 4
     assert not list((tmp_path / "outside").iterdir())
 
 

@@ -15,6 +15,7 @@ from PIL import Image
 from ptmtools.cli.console import Console
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
+from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions
@@ -85,7 +86,8 @@ def no_constant(name: str) -> None:
 def test_cells_without_usable_points_give_json_and_rates(tmp_path, capsys) -> None:
     """Nothing in the rooms keeps a megametre from all surfaces: one point stands for each."""
     path = tmp_path / "tight.db"
-    build_scene(TWO_ROOMS, path, AchOptions(backend="embree", clearance=1e6))
+    options = AchOptions(backend="embree", clearance=1e6), LightOptions("none")
+    build_scene(TWO_ROOMS, path, *options)
     assert main(["tradeoff", str(path), "--stage", "ach", *LITTLE, "--json"]) == 0
     (trade,) = json.loads(capsys.readouterr().out, parse_constant=no_constant)
     assert trade["reference_error"] == 0

@@ -211,7 +211,8 @@ def test_a_build_names_viewpoints_and_cells(tmp_path: Path) -> None:
     """A house of two rooms, behind a door, on each of two storeys."""
     file = house(Ifc()).write(tmp_path / "house.ifc")
     database = tmp_path / "house.db"
-    assert main(["-q", "build-scene", str(file), "-o", str(database), "--samples", "8"]) == 0
+    quick = ["--samples", "8", "--light", "none"]
+    assert main(["-q", "build-scene", str(file), "-o", str(database), *quick]) == 0
     hints = json.loads((database / "www/hints.json").read_text())
     assert sorted(v["description"] for v in hints["viewpoints"]) == [
         f"{storey}, {room}"
