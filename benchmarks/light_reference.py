@@ -137,7 +137,8 @@ class PathTracer:
         """(height, width, 3) linear light, and the standard error of its picture, of 255. A view
         that was traced before is read."""
         tracing = _DEPTH, _PATHS, _PASSES, noise
-        glow = self._model.daylight, CEILINGS if self._ceilings else None
+        ceilings = (CEILINGS, int(self._model.ceilings.sum())) if self._ceilings else None
+        glow = self._model.daylight, ceilings
         key = repr((self._model.digest, glow, self._matt, view, size, tracing))
         file = FOLDER / "traced" / f"{sha256(key.encode()).hexdigest()[:16]}.npz"
         if file.is_file():

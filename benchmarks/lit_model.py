@@ -25,14 +25,15 @@ from ptmtools_samples.lit_hall import corner_normals
 from ptmtools.arrays import Bools, Floats
 from ptmtools.glb import glb_chunks
 from ptmtools.light.building import BLUE, CEILING, GROUND, SKY, WARM
+from ptmtools.light.occlusion import Occluders
 from ptmtools.scene import Scene, ingest
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material
 
 #: What ceilings send that glow, nits.
 CEILINGS = CEILING * SKY * WARM
-#: A ceiling faces down, this far above the model's floor, metres.
-_OVER = 2.2
+#: A ceiling faces down, this far above what is below it, metres, or this share of the highest.
+_OVER, _OF_HIGHEST = 2.2, 0.6
 #: Largest reflectance: with more, light hardly fades.
 _MOST = 0.98
 #: Texels of an image's longer side.
@@ -101,8 +102,12 @@ class LitModel:
         scene = self.scene
         if self.lamps:
             return np.zeros(len(scene.triangles), np.bool_)
-        down = self.normal[:, 0, 1] < -0.9
-        return down & (scene.corners[..., 1].mean(axis=1) > scene.points[:, 1].min() + _OVER)
+        result = self.normal[:, 0, 1] < -0.9
+        around, middle = Occluders.from_scene(scene), scene.corners[result].mean(axis=1)
+        middle[:, 1] -= around.lift
+        height = middle[:, 1] - around.upright(middle, np.ptp(scene.points[:, 1]) + 1, -1.0)
+        result[result] = height >= min(_OVER, _OF_HIGHEST * height.max(initial=0.0))
+        return result
 
     @property
     def daylight(self) -> tuple[Floats, Floats]:

@@ -169,11 +169,13 @@ def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tupl
     from ptmtools.texture.previews import decode_preview, image_bytes
 
     name = "avif" if features.check("avif") else "webp"
+    # Light is smooth, and its hue shows on white walls.
+    full = {"subsampling": "4:4:4"} if name == "avif" else {}
     tries: list[tuple[float, bytes]] = []
     moved = np.zeros(3)
     for _ in range(_TRIES):
         rounded = np.rint(np.clip(texels - moved, 0, 255)).astype(np.uint8)
-        data = image_bytes(rounded, name, quality[name])
+        data = image_bytes(rounded, name, quality[name], **full)
         error = (decode_preview(data, 3) - texels).mean(axis=(0, 1), dtype=np.float64)
         tries.append((float(np.abs(error).max()), data))
         moved += error

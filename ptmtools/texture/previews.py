@@ -284,9 +284,10 @@ def coarse_levels(sides: Sequence[int]) -> int:
     return max(1, sum(side < FIRST_SIDE for side in sides))
 
 
-def image_bytes(texels: Samples, name: str, quality: int) -> bytes:
-    """(h, w, c) uint8 texels as an image of a format in `FORMATS`; grey becomes RGB in WebP and
-    AVIF. Raises MissingComponentError PTM-M100 if Pillow lacks the format."""
+def image_bytes(texels: Samples, name: str, quality: int, **more: Any) -> bytes:
+    """(h, w, c) uint8 texels as an image of a format in `FORMATS`, with ``more`` parameters of the
+    encoder; grey becomes RGB in WebP and AVIF. Raises MissingComponentError PTM-M100 if Pillow
+    lacks the format."""
     import numpy as np
     from PIL import Image, features
 
@@ -302,7 +303,7 @@ def image_bytes(texels: Samples, name: str, quality: int) -> bytes:
         shown = np.concatenate([np.repeat(texels[..., :1], 3, axis=2), texels[..., 1:]], axis=2)
     image = Image.fromarray(shown[..., 0] if shown.shape[2] == 1 else shown)
     buffer = io.BytesIO()
-    image.save(buffer, name.upper(), quality=quality, **FORMATS[name].parameters)
+    image.save(buffer, name.upper(), quality=quality, **FORMATS[name].parameters, **more)
     return buffer.getvalue()
 
 
