@@ -160,8 +160,8 @@ def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tupl
     """The format and the image of (h, w, 3) codes of light, 0 to 255: AVIF, or WebP where Pillow
     cannot write it. ``quality``: of each format.
 
-    Encoders round differences of colour down: whole rooms would turn green. So the image is encoded
-    again without the mean error of the time before, and the one with the least counts.
+    Encoders round differences of colour down: whole rooms would turn green. So codes are dithered,
+    and the image is encoded again without the mean error of the time before; the least counts.
     """
     import numpy as np
     from PIL import features
@@ -173,8 +173,11 @@ def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tupl
     full = {"subsampling": "4:4:4"} if name == "avif" else {}
     tries: list[tuple[float, bytes]] = []
     moved = np.zeros(3)
+    row, column, channel = np.indices(texels.shape)
+    # A sequence with little discrepancy in two dimensions (Roberts).
+    noise = (0.7548777 * row + 0.5698403 * column + channel / 3) % 1 - 0.5
     for _ in range(_TRIES):
-        rounded = np.rint(np.clip(texels - moved, 0, 255)).astype(np.uint8)
+        rounded = np.rint(np.clip(texels + noise - moved, 0, 255)).astype(np.uint8)
         data = image_bytes(rounded, name, quality[name], **full)
         error = (decode_preview(data, 3) - texels).mean(axis=(0, 1), dtype=np.float64)
         tries.append((float(np.abs(error).max()), data))
