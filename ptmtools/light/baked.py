@@ -1,8 +1,8 @@
 """The light that baked surfaces send to an eye: base colours under lightmaps.
 
 A ray meets a face of the scene, and that has pieces in several cells: the piece that holds the
-point, on the side that the ray comes from, knows the texel of its lightmap. Images count by a level
-of at most `SIDE` texels, since all that shows is a reflection.
+point, on the side that the ray comes from, knows the texel of its lightmap. Images are small ones,
+since all that shows is a reflection.
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.jit import kernel
 from ptmtools.light.cells import CellLight
 from ptmtools.light.model import CellSurfaces, coded_light
+from ptmtools.light.reflectance import SmallImages
 from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Scene
 
-#: Texels of the longer side of an image, at most.
-SIDE = 64
 #: The light of a piece: none, by the lightmap, at the corners.
 _UNLIT, _MAPPED, _CORNERS = range(3)
 
@@ -41,8 +40,7 @@ class BakedSurfaces:
     tint, glow, both: (T, 3) base colours beside images, (T, 3) what faces send by themselves, and
         (T,) whether from both sides.
     image, place: (T,) index of an image, -1 for none; (T, 3, 2) coordinates in it.
-    colors, image_first, image_size: (n, 3) float32 linear texels of all images; (I,); (I, 2) width
-        and height.
+    images: of the scene.
     unlit: what a white surface without light sends.
     """
 
@@ -63,9 +61,7 @@ class BakedSurfaces:
     both: Bools
     image: Ints
     place: Floats
-    colors: Singles
-    image_first: Ints
-    image_size: Ints
+    images: SmallImages
     unlit: float
 
     @staticmethod
@@ -75,10 +71,10 @@ class BakedSurfaces:
         lights: Sequence[CellLight],
         tint: Floats,
         glow: Floats,
-        images: Sequence[NDArray[np.uint8]],
+        images: SmallImages,
         unlit: float,
     ) -> BakedSurfaces:
-        """``tint``, ``glow``: as the fields; ``images``: (h, w, 3) sRGB, at most `SIDE` texels."""
+        """``tint``, ``glow``: as the fields; ``images``: of the scene."""
         face = np.concatenate([surfaces.face for surfaces in pieces])
         order = np.argsort(face, kind="stable")
         start = np.searchsorted(face[order], np.arange(len(scene.triangles) + 1))
@@ -89,7 +85,6 @@ class BakedSurfaces:
         shares = to_linear(np.concatenate([light.vertex for light in lights]) / 255)
         maps = [np.zeros((0, 0, 3)) if k.texels is None else np.rint(k.texels) for k in lights]
         sizes = np.array([len(texels) for texels in maps])
-        colors = [to_linear(texels / 255).astype(np.float32).reshape(-1, 3) for texels in images]
         image = np.array([material.image for material in scene.materials], np.int64)
         return BakedSurfaces(
             start,
@@ -109,9 +104,7 @@ class BakedSurfaces:
             scene.two_sided,
             image[scene.triangle_material],
             scene.uv,
-            np.concatenate([np.zeros((0, 3), np.float32), *colors]),
-            _starts(np.array([texels.shape[0] * texels.shape[1] for texels in images], np.int64)),
-            np.array([texels.shape[1::-1] for texels in images], np.int64).reshape(-1, 2),
+            images,
             unlit,
         )
 
@@ -132,7 +125,7 @@ class BakedSurfaces:
         textured = np.flatnonzero(self.image[face] >= 0)
         across, along = u[textured, None], v[textured, None]
         a, b, c = np.moveaxis(self.place[face[textured]], 1, 0)
-        colors[textured] *= self._texels(
+        colors[textured] *= self.images.texels(
             self.image[face[textured]], a + across * (b - a) + along * (c - a)
         )
         sent = colors * light
@@ -150,13 +143,6 @@ class BakedSurfaces:
         )
         code = self.texels[self.first[cell] + row * size + column]
         return np.asarray(_SHARES[code] * self.white[cell][:, None])
-
-    def _texels(self, image: Ints, at: Floats) -> Singles:
-        """(n, 3) the nearest texels of images, which repeat."""
-        size = self.image_size[image]
-        place = np.stack([at[:, 0] % 1.0, (1 - at[:, 1]) % 1.0], axis=1) * size
-        column, row = np.minimum(place.astype(np.int64), size - 1).T
-        return np.asarray(self.colors[self.image_first[image] + row * size[:, 0] + column])
 
 
 #: The share of white of each code.

@@ -51,7 +51,7 @@ _WHITE = 0.995
 #: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
 #: and the share of the surfaces that is no brighter than the other number, so that white walls keep
 #: their texture.
-_KEY, _HIGH, _MOST_OF_WHITE = 0.3, 0.9, 0.75
+_KEY, _HIGH, _MOST_OF_WHITE = 0.3, 0.9, 0.65
 #: Eyes get used to this share of a hue, as photographers balance white, a logarithm; and components
 #: of light count as at least this share of its luminance.
 _ADAPTATION, _LEAST_HUE = 0.7, 0.1

@@ -20,6 +20,7 @@ from ptmtools.light.probes import (
     filter_lobe,
     with_border,
 )
+from ptmtools.light.reflectance import SmallImages
 from ptmtools.scene.lights import Lamp, Lights
 from tests.light.test_cells import HEIGHT, OPTIONS, SIDE, piece, room, scene_of
 
@@ -36,7 +37,9 @@ def probe_of(corner: Floats, points: Floats, lights: Lights | None = None) -> Pr
     building = BuildingBaking(scene, [pieces], lights, tint).light()
     baking = LightBaking(OPTIONS, building, None, tint[:, 1].astype(np.float32))
     lit, black = baking.light(pieces), np.zeros_like(tint)
-    surfaces = BakedSurfaces.of_scene(scene, [pieces], [lit], tint, black, [], 1.0)
+    surfaces = BakedSurfaces.of_scene(
+        scene, [pieces], [lit], tint, black, SmallImages.of_texels([]), 1.0
+    )
     return ProbeBaking(building, surfaces, np.arange(len(corner)), corner).probe(points)
 
 

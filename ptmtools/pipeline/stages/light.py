@@ -27,7 +27,12 @@ from ptmtools.pipeline.encoding import (
 )
 from ptmtools.pipeline.stage import Counts, Stage, complete
 from ptmtools.pipeline.stages.cells import CELLS
-from ptmtools.pipeline.stages.probes import BakedBuilding, bake_probes, reflective_shapes
+from ptmtools.pipeline.stages.probes import (
+    BakedBuilding,
+    bake_probes,
+    reflective_shapes,
+    small_images,
+)
 from ptmtools.pipeline.stages.scene import (
     SCENE,
     image_bytes,
@@ -128,6 +133,7 @@ def _reflectance(artifacts: Artifacts) -> NDArray[np.float64]:
     """(T, 3) the mean colour of each face of the scene, linear light."""
     import numpy as np
 
+    from ptmtools.light.reflectance import image_colors
     from ptmtools.scene.colors import to_linear
 
     def read(name: str) -> bytes:
@@ -145,12 +151,11 @@ def _reflectance(artifacts: Artifacts) -> NDArray[np.float64]:
         spread = (steps.errors[0] / 255) ** 2
         curve = 2.4 * 1.4 / 1.055**2 * ((mean + 0.055) / 1.055) ** 0.4
         means.append(np.clip(to_linear(mean) + curve * spread / 2, 0, 1))
-    mean = np.array([means[m.image] if m.image >= 0 else np.ones(3) for m in scene.materials])
-    mean = mean.reshape(-1, 3)
+    shown = image_colors(scene, small_images(artifacts), np.array(means).reshape(-1, 3))
     if (lights := lights_of(artifacts)) is not None:
         # They show their emission, and are dark themselves.
-        mean[lights.unlit & lights.glow.any(axis=1)] = 0
-    return np.asarray(_tint(scene) * mean[scene.triangle_material])
+        shown[(lights.unlit & lights.glow.any(axis=1))[scene.triangle_material]] = 0
+    return np.asarray(_tint(scene) * shown)
 
 
 def _tint(scene: Scene) -> NDArray[np.float64]:
@@ -336,8 +341,8 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 7
-    changed = "the hue of the light of a room counts half or less: white is balanced"
+    recipe = 8
+    changed = "white is balanced; faces reflect as their part of an image does"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")

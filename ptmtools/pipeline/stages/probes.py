@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ptmtools.light.cells import CellLight
     from ptmtools.light.model import CellSurfaces, Light
     from ptmtools.light.probes import Probe, ProbeBaking
+    from ptmtools.light.reflectance import SmallImages
     from ptmtools.output.geometry import Geometry
     from ptmtools.scene.lights import Lights
     from ptmtools.scene.model import Scene
@@ -123,7 +124,7 @@ def bake_probes(
         lit.lights,
         lit.tint,
         lit.building.shine[scene.triangle_material],
-        _small_images(run),
+        small_images(run),
         lit.unlit,
     )
     faces = np.flatnonzero(scene.opaque)
@@ -138,12 +139,12 @@ def bake_probes(
     return rows, sum(served for _, served in baked)
 
 
-def _small_images(artifacts: Artifacts) -> list[NDArray[np.uint8]]:
-    """(h, w, 3) sRGB of each image of the scene: its finest level that is small enough, or every
-    n-th texel of its coarsest."""
+def small_images(artifacts: Artifacts) -> SmallImages:
+    """Those of the scene: of each its finest level that is small enough, or every n-th texel of its
+    coarsest."""
     import numpy as np
 
-    from ptmtools.light.baked import SIDE
+    from ptmtools.light.reflectance import SIDE, SmallImages
     from ptmtools.texture import reader
     from ptmtools.texture.samples import in_eight_bits
 
@@ -159,4 +160,4 @@ def _small_images(artifacts: Artifacts) -> list[NDArray[np.uint8]]:
         colors = texels[:, :, :3] if texels.shape[2] >= 3 else texels[:, :, [0, 0, 0]]
         step = math.ceil(max(colors.shape) / SIDE)
         result.append(np.ascontiguousarray(colors[::step, ::step]))
-    return result
+    return SmallImages.of_texels(result)
