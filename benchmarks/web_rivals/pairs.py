@@ -111,8 +111,8 @@ def draw(ptm: str, database: Path, view: dict[str, Any], folder: Path) -> Any:
 
 
 def draw_by_three(model: Path, database: Path, views: list[dict[str, Any]]) -> list[Any]:
-    """The same views by three.js: of the file itself if it is a GLB in metres with Y up, else of a
-    GLB of all its triangles."""
+    """The same views by three.js: of the file itself if it is a GLB without Draco in metres with Y up,
+    else of a GLB of all its triangles."""
     import io
 
     from browsers import web
@@ -120,7 +120,8 @@ def draw_by_three(model: Path, database: Path, views: list[dict[str, Any]]) -> l
 
     hints = json.loads((database / "www/hints.json").read_text("utf-8"))
     whole, shift = model.read_bytes(), np.array(hints["origin"])
-    if model.suffix != ".glb" or (hints["unit"], hints["up"]) != (1, "y"):
+    itself = model.suffix == ".glb" and b"KHR_draco_mesh_compression" not in whole
+    if not itself or (hints["unit"], hints["up"]) != (1, "y"):
         scene = load(database)
         whole, shift = lit(whole_glb(scene, in_form(scene.images, "png"), "image/png"), scene), 0.0
     script = joined()
