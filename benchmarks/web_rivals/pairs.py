@@ -111,8 +111,8 @@ def draw(ptm: str, database: Path, view: dict[str, Any], folder: Path) -> Any:
 
 
 def draw_by_three(model: Path, database: Path, views: list[dict[str, Any]]) -> list[Any]:
-    """The same views by three.js: of the file itself if it is a GLB without Draco in metres with Y up,
-    else of a GLB of all its triangles."""
+    """The same views by three.js: of the file itself if it is a GLB in metres with Y up and without
+    Draco, else of a GLB of all its triangles."""
     import io
 
     from browsers import web
