@@ -87,22 +87,22 @@ def test_what_cannot_be_walked_in_is_not_to_be_served(ptm: Ptm, database: Path) 
 
 
 def test_the_same_bytes_anywhere_and_with_any_number_of_workers(
-    tmp_path: Path, build: Build
+    tmp_path: Path, database: Path, build: Build
 ) -> None:
-    shutil.copytree(TWO_ROOMS, tmp_path / "elsewhere")
-    build(TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db", "-j", 1)
-    build(tmp_path / "elsewhere" / "two_rooms.obj", tmp_path / "deep" / "b", "-j", 2)
-    assert listing(tmp_path / "a.db") == listing(tmp_path / "deep" / "b")
+    """The database of the session is one process's, of a model in another folder."""
+    build(TWO_ROOMS / "two_rooms.obj", tmp_path / "deep" / "b", "-j", 2)
+    assert listing(database) == listing(tmp_path / "deep" / "b")
 
 
-def test_stage_by_stage_is_the_same_as_all_at_once(tmp_path: Path, ptm: Ptm) -> None:
+def test_stage_by_stage_is_the_same_as_all_at_once(
+    tmp_path: Path, database: Path, ptm: Ptm
+) -> None:
     model, db = TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db"
     assert ptm("cells", model, "-o", db).status == 0
     for stage in ("pvs", "ach", "textures", "relief", "light", "emit"):
         outcome = ptm(stage, db)
         assert (outcome.status, outcome.err) == (0, "")
-    assert ptm("build-scene", model, "-o", tmp_path / "b.db").status == 0
-    assert listing(db) == listing(tmp_path / "b.db")
+    assert listing(db) == listing(database)
 
 
 def test_textures_within_an_error_have_twins_of_the_same_texels(
@@ -162,9 +162,8 @@ def test_only_what_changed_is_done_again(tmp_path: Path, ptm: Ptm, build: Build)
     assert listing(db) == before
 
 
-def test_damage_is_mended(tmp_path: Path, ptm: Ptm, build: Build) -> None:
-    model, db = TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db"
-    build(model, db)
+def test_damage_is_mended(database: Path, ptm: Ptm, build: Build) -> None:
+    model, db = TWO_ROOMS / "two_rooms.obj", database
     before = listing(db)
     for name, stage in (
         ("stages/cells.npz", "cells"),
@@ -179,9 +178,8 @@ def test_damage_is_mended(tmp_path: Path, ptm: Ptm, build: Build) -> None:
         assert listing(db) == before
 
 
-def test_a_stage_that_others_have_left_behind_is_refused(tmp_path: Path, ptm: Ptm) -> None:
-    model, db = TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db"
-    assert ptm("build-scene", model, "-o", db).status == 0
+def test_a_stage_that_others_have_left_behind_is_refused(database: Path, ptm: Ptm) -> None:
+    model, db = TWO_ROOMS / "two_rooms.obj", database
     assert ptm("cells", model, "-o", db, "--max-leaves", 2).status == 0
     before = listing(db)
     outcome = ptm("ach", db)
@@ -195,11 +193,9 @@ def test_a_stage_that_others_have_left_behind_is_refused(tmp_path: Path, ptm: Pt
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
 def test_a_build_that_was_stopped_is_resumed(
-    tmp_path: Path, end: signal.Signals, build: Build
+    tmp_path: Path, database: Path, end: signal.Signals, build: Build
 ) -> None:
-    model = TWO_ROOMS / "two_rooms.obj"
-    build(model, tmp_path / "whole.db")
-    db = tmp_path / "a.db"
+    model, db = TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db"
     with subprocess.Popen(
         [SCRIPT, "build-scene", model, "-o", db, "-q"], stderr=subprocess.PIPE, text=True
     ) as process:
@@ -217,7 +213,7 @@ def test_a_build_that_was_stopped_is_resumed(
         assert process.returncode in (0, -signal.SIGKILL)
     report = build(model, db)
     assert "scene" not in ran(report)
-    assert listing(db) == listing(tmp_path / "whole.db")
+    assert listing(db) == listing(database)
 
 
 def test_foreign_files_stay(tmp_path: Path, ptm: Ptm, build: Build) -> None:
@@ -246,7 +242,7 @@ def test_no_fallback(tmp_path: Path, ptm: Ptm, build: Build) -> None:
 
 
 def test_hospital(shared: Path, tmp_path: Path, ptm: Ptm, build: Build) -> None:
-    quick = ("--samples", 2, "--face", 16)
+    quick = ("--samples", 2, "--face", 16, "--light-samples", 4, "--light-density", 4)
     db = tmp_path / "hospital.db"
     report = build(shared / "scenes/hospital/hospital.obj", db, *quick)
     counts = {stage["stage"]: stage["counts"] for stage in report["stages"]}
@@ -262,10 +258,8 @@ def test_hospital(shared: Path, tmp_path: Path, ptm: Ptm, build: Build) -> None:
     assert ran(build(shared / "scenes/hospital/hospital.obj", db, *quick)) == []
 
 
-def test_a_stage_run_alone_leaves_the_later_ones_stale(tmp_path: Path, ptm: Ptm) -> None:
-    db = tmp_path / "a.db"
-    model = TWO_ROOMS / "two_rooms.obj"
-    assert ptm("build-scene", model, "-o", db).status == 0
+def test_a_stage_run_alone_leaves_the_later_ones_stale(database: Path, ptm: Ptm) -> None:
+    model, db = TWO_ROOMS / "two_rooms.obj", database
     assert ptm("validate", db).status == 0
     assert ptm("cells", model, "-o", db, "--max-leaves", 1).status == 0
     stale = ptm("validate", db)
@@ -277,7 +271,8 @@ def test_gallery_is_one_hall_and_said_to_be(
     shared: Path, tmp_path: Path, ptm: Ptm, build: Build
 ) -> None:
     db = tmp_path / "gallery.db"
-    report = build(shared / "scenes/gallery/gallery.obj", db, "--samples", 2, "--face", 16)
+    quick = ("--samples", 2, "--face", 16, "--light-samples", 4)
+    report = build(shared / "scenes/gallery/gallery.obj", db, *quick)
     counts = {stage["stage"]: stage["counts"] for stage in report["stages"]}
     assert counts["cells"]["cells"] == 1
     assert counts["cells"]["leaves"] > 20

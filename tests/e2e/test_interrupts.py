@@ -23,7 +23,7 @@ BUILD = [sys.executable, "-m", "ptmtools", "build-scene", *QUICK]
 @pytest.fixture(scope="module")
 def museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Large enough for processes beside: 4,000 triangles, and 8 textures."""
-    return make_museum(tmp_path_factory.mktemp("museum"), rooms=4, textures=18, size=512)
+    return make_museum(tmp_path_factory.mktemp("museum"), rooms=4, textures=18, size=256)
 
 
 def until(condition: Callable[[], bool]) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
+from ptmtools.light.options import LightOptions
 from ptmtools.link import Conditions
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.served import Served, read_served
@@ -37,7 +38,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database, and a walk through it."""
     folder = tmp_path_factory.mktemp("bumpy")
     model = write_bumpy(folder / "model", {"room_a": "norm waves.png"})
-    build_scene(model, folder / "db", AchOptions(samples=4, backend="embree"), workers=1)
+    options = AchOptions(samples=4, backend="embree"), LightOptions(light_samples=4)
+    build_scene(model, folder / "db", *options, workers=1)
     walk = ["path", str(folder / "db"), "-o", str(folder / "walk.json"), "--duration", "10"]
     assert main(["-q", *walk]) == 0
     return folder
@@ -161,7 +163,8 @@ def test_pictures_of_a_walk_show_them(world: World) -> None:
 
 def test_lit_walks_show_the_maps_of_objects(tmp_path: Path) -> None:
     model, db = write_rooms(tmp_path / "model", 4), tmp_path / "db"
-    options = ["--samples", "4", "-j", "1", "--apo", "statue*", "--apo-faces", "500"]
+    options = ["--samples", "4", "--light-samples", "4", "-j", "1"]
+    options += ["--apo", "statue*", "--apo-faces", "500"]
     options += ["--apo-error", "0.1", "--relief", "normal-map"]
     assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
     walk = ["path", str(db), "-o", str(tmp_path / "walk.json"), "--duration", "2"]
