@@ -12,12 +12,15 @@ from __future__ import annotations
 
 import sys
 from importlib.abc import MetaPathFinder
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
 PACKAGE = Path(__file__).parent
 #: None: unknown, unreadable or of two states.
 _imported: dict[Path, bytes | None] = {}
+#: The files of modules that were there when they were first looked for.
+_files: dict[str, Path] = {}
 
 
 class _SourceReader(MetaPathFinder):
@@ -53,6 +56,11 @@ def _read(file: Path) -> bytes | None:
 
 def module_file(name: str) -> Path | None:
     """The file of a module of the package, such as "ptmtools.light.model"; None without one."""
-    path = PACKAGE.parent.joinpath(*name.split("."))
-    files = (path.with_suffix(".py"), path / "__init__.py")
-    return next((file for file in files if file in _imported or file.is_file()), None)
+    if name not in _files:
+        # Most names are no modules, and paths take long to make.
+        path = f"{PACKAGE.parent}/{name.replace('.', '/')}"
+        found = next((file for file in (f"{path}.py", f"{path}/__init__.py") if isfile(file)), None)
+        if found is None:
+            return None
+        _files[name] = Path(found)
+    return _files[name]
