@@ -119,6 +119,7 @@ class _StepsEncoder:
     def _ptm(self, last: int, limit: float = 0) -> tuple[bytes, Detail]:
         """The `.ptm` with the kept levels up to ``last``, with fewer if it has more than ``limit``
         bytes; 0 is no limit."""
+        from ptmtools.texture.container import read_header
         from ptmtools.texture.encoder import encode_to
 
         while True:
@@ -134,7 +135,11 @@ class _StepsEncoder:
             data = buffer.getvalue()
             if not limit or len(data) <= limit or last == self._kept[0]:
                 return data, detail
-            last -= 1
+            levels = read_header(data).levels
+            # With an allowed error, the finest level decides how those below it are coded.
+            room = math.inf if options.max_error else limit + levels[0].offset
+            small = [n for n, level in zip(self._kept, levels, strict=False) if level.end <= room]
+            last = min(last - 1, max(small, default=self._kept[0]))
 
     def _steps(self, data: bytes, levels: int) -> Sequence[tuple[Preview, bytes]]:
         """The previews beside a `.ptm`, and their files."""
