@@ -42,15 +42,15 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (68_600, 334),
-    "ptmtools/*.py": (4_140, 26),
+    "ptmtools": (68_740, 334),
+    "ptmtools/*.py": (4_150, 26),
     "ptmtools/cells": (7_990, 26),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
-    "ptmtools/light": (3_060, 14),
+    "ptmtools/light": (3_190, 14),
     "ptmtools/meshopt": (870, 5),
     "ptmtools/output": (8_110, 39),
-    "ptmtools/pipeline": (4_030, 20),
+    "ptmtools/pipeline": (4_040, 20),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (2_030, 13),
     "ptmtools/scene": (9_600, 47),
@@ -58,12 +58,12 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_640, 25),
     "ptmtools/store": (2_230, 13),
-    "ptmtools/texture": (10_050, 44),
+    "ptmtools/texture": (10_060, 44),
     "ptmtools/tour": (1_340, 8),
     "ptmtools/visibility": (960, 6),
     "ptmtools_lab": (11_660, 51),
     "ptmtools_samples": (8_740, 58),
-    "ptmtools_systems": (8_060, 52),
+    "ptmtools_systems": (8_070, 52),
 }
 #: Functions of a package that are named by a participle, and by a preposition.
 NAMES: dict[str, tuple[int, int]] = {

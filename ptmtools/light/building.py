@@ -30,7 +30,7 @@ from ptmtools.light.lamps import (
 )
 from ptmtools.light.looks import planes
 from ptmtools.light.occlusion import Occluders, normals, points_on, spread_over, turns
-from ptmtools.light.patches import LightPatches
+from ptmtools.light.patches import LightPatches, are_small
 from ptmtools.light.transport import PASSES, Daylight, LightField, transport
 from ptmtools.scene.colors import luminance
 
@@ -52,7 +52,7 @@ _OVER, _OF_HIGHEST, _DOWN = 2.2, 0.6, 0.9
 _PLAUSIBLE = 100.0
 #: Metres of a patch; most patches of a building, whose patches are larger where necessary.
 PATCH, MOST = 0.4, 400_000
-#: Points of a patch at which lamps are looked for, and shadow rays of each.
+#: Points of a patch at which lamps are looked for, one of a small one, and shadow rays of each.
 _POINTS, _SHADOWS = 2, 4
 #: Metres of the patches of lamps, and most lamps, as patches of the building see them.
 _LAMP, _LAMPS = 0.4, 1024
@@ -63,8 +63,8 @@ _SAMPLES, _RAYS = 4096, 32
 _DARK, _MANY, _LIFT = 0.02, 0.03, 0.5
 #: Passes for what ceilings add to a light in balance.
 _AGAIN = 6
-#: Points of a face, and rays from each, that tell which side is brighter; sides are alike up to
-#: this ratio of their light.
+#: Points of a face, one of a small one, and rays from each, that tell which side is brighter; sides
+#: are alike up to this ratio of their light.
 _SIDE_POINTS, _SIDE_RAYS, _ALIKE = 4, 8, 2.0
 #: Share of rays to what is nearer than half a texel, or to the inside of walls, from which on a
 #: point is covered.
@@ -105,12 +105,13 @@ class BuildingLight:
         wanted = area > 0
         plane = planes(corner, normal, wanted)
         along = np.where(np.einsum("tx,tx->t", normal, normal[plane]) < 0, -1.0, 1.0)
-        face = np.repeat(np.arange(len(corner)), _SIDE_POINTS)
-        point = points_on(corner[face], np.tile(np.arange(_SIDE_POINTS), len(corner)))
+        count = np.where(are_small(area), 1, _SIDE_POINTS)
+        face = np.repeat(np.arange(len(corner)), count)
+        point = points_on(corner[face], np.arange(len(face)) - (np.cumsum(count) - count)[face])
         turn, sums = turns(len(face)), []
         for sign in (1.0, -1.0):
             light = self._light(point, sign * normal[face], turn, _SIDE_RAYS)
-            sums.append(luminance(light).reshape(-1, _SIDE_POINTS).mean(axis=1))
+            sums.append(sum_by_group(face, luminance(light), len(corner)) / count)
         front, back = sums
         difference = sum_by_group(plane, along * area * (front - back), len(corner))[plane]
         alike = np.maximum(front, back) < _ALIKE * np.minimum(front, back)
@@ -149,7 +150,7 @@ class GatheredLight:
 
     def direct(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         """(n, 3) the light of lamps."""
-        around, rays = self.building.field.around, max(1, self.samples // 16)
+        around, rays = self.building.field.around, max(1, self.samples // 8)
         light = direct_light(around, self.lamps, point, self.normal[face], turn, rays)
         return light.astype(np.float32)
 
@@ -193,13 +194,14 @@ class BuildingBaking:
         coarse = lamps_of(self._scene, self._lights, _LAMP, _LAMPS)
         if not len(lamps.kind):
             emission = self._ceilings(CEILING * SKY * WARM)
-            return self._balance(lamps, coarse, daylight, emission)
+            return self._balance(lamps, self._direct(coarse), daylight, emission)
         factors = self._factors(lamps, daylight)
         daylight = Daylight(factors[1] * daylight.sky, factors[1] * daylight.ground)
         lamps, coarse = (_strengthen(some, factors) for some in (lamps, coarse))
         if self._lights is not None:
             self._shine = factors[2] * lamp_radiance(self._scene, self._lights)
-        building = self._balance(lamps, coarse, daylight, None)
+        direct = self._direct(coarse)
+        building = self._balance(lamps, direct, daylight, None)
         point, normal, turn = self._points()
         light = luminance(building._light(point, normal, turn, _RAYS))
         dark = light < _DARK * building.usual
@@ -208,7 +210,7 @@ class BuildingBaking:
         emission = self._ceilings(_LIFT * building.usual * WARM, building)
         if emission is None:
             return building
-        return self._balance(lamps, coarse, daylight, emission, building.field)
+        return self._balance(lamps, direct, daylight, emission, building.field)
 
     def _points(self) -> tuple[Floats, Floats, Floats]:
         """(n, 3) points that stand for all surfaces, (n, 3) their normals and (n,) turns."""
@@ -239,19 +241,29 @@ class BuildingBaking:
         first, second, third = (max(present) / value if value else 1.0 for value in usual)
         return first, second, third
 
+    def _direct(self, lamps: Lamps) -> Floats:
+        """(patches, 3) the light of lamps."""
+        light, spread = np.zeros((self._patches.count, 3)), turns(self._patches.count)
+        if not len(lamps):
+            return light
+        small = are_small(self._patches.areas()[self._patches.faces()[0]])
+        for k in range(_POINTS):
+            point, normal = self._patch_points(k / _POINTS)
+            part = np.flatnonzero(~small | (k == 0))
+            given = point[part], normal[part], spread[part]
+            light[part] += direct_light(self._around, lamps, *given, _SHADOWS)
+        light[~small] /= _POINTS
+        return light
+
     def _balance(
         self,
         lamps: Lamps,
-        coarse: Lamps,
+        direct: Floats,
         daylight: Daylight,
         emission: Floats | None,
         start: LightField | None = None,
     ) -> BuildingLight:
         patches, around = self._patches, self._around
-        spread, direct = turns(patches.count), np.zeros((patches.count, 3))
-        for k in range(_POINTS if len(coarse) else 0):
-            point, normal = self._patch_points(k / _POINTS)
-            direct += direct_light(around, coarse, point, normal, spread, _SHADOWS) / _POINTS
         glow = 0.0 if emission is None else emission
         passes = PASSES if start is None else _AGAIN
         field = transport(around, patches, self._albedo, direct, daylight, glow, passes, start)

@@ -127,17 +127,28 @@ class TexelGrid:
 
 @kernel
 def blur(variance: NDArray[np.float32], chart: NDArray[np.int32]) -> NDArray[np.float32]:
-    """(h, w) the mean of the variances of the 7 × 7 texels around each in its chart."""
+    """(h, w) the mean of the variances of the 7 × 7 texels around each in its chart: of rows, then
+    of these along columns."""
     height, width = variance.shape
+    sums, counts = np.zeros_like(variance), np.zeros_like(chart)
+    for row in range(height):
+        for column in range(width):
+            if chart[row, column] < 0:
+                continue
+            for c in range(max(column - 3, 0), min(column + 4, width)):
+                if chart[row, c] == chart[row, column]:
+                    sums[row, column] += variance[row, c]
+                    counts[row, column] += 1
     result = np.zeros_like(variance)
     for row in range(height):
         for column in range(width):
+            if chart[row, column] < 0:
+                continue
             total, count = 0.0, 0
             for r in range(max(row - 3, 0), min(row + 4, height)):
-                for c in range(max(column - 3, 0), min(column + 4, width)):
-                    if chart[r, c] == chart[row, column]:
-                        total += variance[r, c]
-                        count += 1
+                if chart[r, column] == chart[row, column]:
+                    total += sums[r, column]
+                    count += counts[r, column]
             result[row, column] = total / count
     return result
 
@@ -151,36 +162,40 @@ def smooth(
     least: float,
     spline: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """One round: (h, w, k) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
+    """One round: (h, w, 3) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
     and `_SPLINE`."""
-    height, width, channels = value.shape
-    result, rest = np.zeros_like(value), np.zeros_like(variance)
+    height, width, _ = value.shape
+    result, rest, mean = np.zeros_like(value), np.zeros_like(variance), np.zeros_like(variance)
     for row in range(height):
         for column in range(width):
-            if chart[row, column] < 0:
+            red, green, blue = value[row, column, 0], value[row, column, 1], value[row, column, 2]
+            mean[row, column] = (red + green + blue) / 3
+    for row in range(height):
+        for column in range(width):
+            number = chart[row, column]
+            if number < 0:
                 continue
-            centre = 0.0
-            for k in range(channels):
-                centre += value[row, column, k] / channels
-            apart = _APART * np.sqrt(variance[row, column]) + least
-            weight, total = 0.0, 0.0
+            centre = mean[row, column]
+            sharp = 1 / (_APART * np.sqrt(variance[row, column]) + least)
+            weight, total, red, green, blue = 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(-2, 3):
+                r = row + step * i
+                if not 0 <= r < height:
+                    continue
                 for j in range(-2, 3):
-                    r, c = row + step * i, column + step * j
-                    if not (0 <= r < height and 0 <= c < width):
+                    c = column + step * j
+                    if not 0 <= c < width or chart[r, c] != number:
                         continue
-                    if chart[r, c] != chart[row, column]:
-                        continue
-                    mean = 0.0
-                    for k in range(channels):
-                        mean += value[r, c, k] / channels
-                    share = spline[abs(i)] * spline[abs(j)] * np.exp(-abs(centre - mean) / apart)
+                    apart = np.exp(-abs(centre - mean[r, c]) * sharp)
+                    share = spline[abs(i)] * spline[abs(j)] * apart
                     weight += share
                     total += share * share * variance[r, c]
-                    for k in range(channels):
-                        result[row, column, k] += share * value[r, c, k]
-            for k in range(channels):
-                result[row, column, k] /= weight
+                    red += share * value[r, c, 0]
+                    green += share * value[r, c, 1]
+                    blue += share * value[r, c, 2]
+            result[row, column, 0] = red / weight
+            result[row, column, 1] = green / weight
+            result[row, column, 2] = blue / weight
             rest[row, column] = total / (weight * weight)
     return result, rest
 
@@ -272,17 +287,33 @@ def _vertex_numbers(corner: Floats, normal: Floats) -> Ints:
     place = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].ravel()
     facing = np.repeat(normal, 3, axis=0)
     order = np.argsort(place, kind="stable")
-    number = np.empty(len(place), np.int64)
-    given = 0
-    for these in np.split(order, np.flatnonzero(np.diff(place[order])) + 1):
-        first: list[tuple[Floats, int]] = []
-        for place_row in these.tolist():
-            known = next((n for way, n in first if way @ facing[place_row] >= SMOOTH), -1)
-            if known < 0:
-                known, given = given, given + 1
-                first.append((facing[place_row], known))
-            number[place_row] = known
-    return number.reshape(-1, 3)
+    return number_by_way(order, place[order], facing).reshape(-1, 3)
+
+
+@kernel
+def number_by_way(
+    order: NDArray[np.int64], place: NDArray[np.int64], way: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """(n,) numbers, equal for rows in one place whose (n, 3) ways are nearly those of the first of
+    them. ``order``: (n,) the rows by their ``place``."""
+    number, given = np.empty(len(order), np.int64), 0
+    first = np.empty(len(order), np.int64)  # the first row of each number
+    for k in range(len(order)):
+        if k == 0 or place[k] != place[k - 1]:
+            low = given
+        row, known = order[k], -1
+        for candidate in range(low, given):
+            cosine = 0.0
+            for axis in range(3):
+                cosine += way[first[candidate], axis] * way[row, axis]
+            if cosine >= SMOOTH:
+                known = candidate
+                break
+        if known < 0:
+            known, first[given] = given, row
+            given += 1
+        number[row] = known
+    return number
 
 
 def _fit(vertex: Ints, share: Floats, seen: Floats, area: Floats) -> Floats:

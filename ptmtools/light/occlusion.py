@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ptmtools import arrays
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.embree import ray_tree
+from ptmtools.jit import kernel
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
 
@@ -84,9 +85,7 @@ class Occluders:
         along = (way / np.maximum(distance, np.finfo(float).tiny)[:, None]).astype(np.float32)
         start = (origin - self.middle).astype(np.float32)
         short = (distance * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
-        # A copy: Embree writes into its arguments.
-        hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
-        return np.asarray(hit >= short)
+        return np.asarray(self.tree.run(start, along, dists=short, query="OCCLUDED") < 0)
 
     def upright(self, point: Floats, height: float, way: float) -> Floats:
         """(n,) the heights of the first surfaces above (``way`` 1) or below (-1) (n, 3) points, at
@@ -129,20 +128,40 @@ def turns(count: int) -> Floats:
     return np.asarray(np.arange(count) * GOLDEN % 1.0)
 
 
-def tangent_frames(normal: Floats, turn: Floats) -> Singles:
-    """(n, 3, 3) rows: two tangents, turned, and the normal."""
-    # Duff et al. 2017, without a branch but for the sign.
-    x, y, z = normal.T
-    sign = np.where(z < 0, -1.0, 1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    second = np.stack([b, sign + y * y * a, -y], axis=1)
-    angle = 2 * math.pi * turn
-    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    return np.stack([c * first + s * second, c * second - s * first, normal], axis=1).astype(
-        np.float32
-    )
+@kernel
+def rays_over(
+    start: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    turn: NDArray[np.float64],
+    fan: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(n * m, 3) origins and directions of rays: from each of (n, 3) points those of a (m, 3)
+    ``fan`` over z, with z along (n, 3) unit normals, turned about them by (n,) turns."""
+    origin = np.empty((len(start) * len(fan), 3), np.float32)
+    along = np.empty_like(origin)
+    frame = np.empty((3, 3), np.float32)
+    for p in range(len(start)):
+        # Duff et al. 2017, without a branch but for the sign.
+        x, y, z = normal[p, 0], normal[p, 1], normal[p, 2]
+        sign = -1.0 if z < 0 else 1.0
+        a = -1.0 / (sign + z)
+        b = x * y * a
+        first = (1 + sign * x * x * a, sign * b, -sign * x)
+        second = (b, sign + y * y * a, -y)
+        c, s = np.cos(2 * np.pi * turn[p]), np.sin(2 * np.pi * turn[p])
+        for axis in range(3):
+            frame[0, axis] = c * first[axis] + s * second[axis]
+            frame[1, axis] = c * second[axis] - s * first[axis]
+            frame[2, axis] = normal[p, axis]
+        for k in range(len(fan)):
+            for axis in range(3):
+                origin[p * len(fan) + k, axis] = start[p, axis]
+                along[p * len(fan) + k, axis] = (
+                    fan[k, 0] * frame[0, axis]
+                    + fan[k, 1] * frame[1, axis]
+                    + fan[k, 2] * frame[2, axis]
+                )
+    return origin, along
 
 
 #: Multiples of these modulo 1 are far apart in both directions (Roberts' R2 sequence).

@@ -18,6 +18,13 @@ from ptmtools.jit import inlined_kernel, kernel
 
 #: Largest number of parts of an edge; the patches of a face of a kilometre are larger.
 _MOST = 256
+#: Surfaces of less than this share of the usual area matter little by themselves.
+_SMALL = 0.1
+
+
+def are_small(area: Floats) -> Bools:
+    """(n,) which of some areas are small beside their mean, weighted by themselves."""
+    return np.asarray(area * area.sum() < _SMALL * (area**2).sum())
 
 
 @dataclass(frozen=True)

@@ -204,31 +204,43 @@ def _octahedron(place: Floats) -> Floats:
     return np.stack([np.where(below, over, x), y, np.where(below, along, z)], axis=1)
 
 
-def _prefilter(light: Floats) -> list[Floats]:
+def _prefilter(light: Floats) -> list[Singles]:
     """(m, 3) each of the maps but the first, for (n, 3) light of the first."""
     side = PROBE_MAPS[0][2] - 2
     # No lobe is as narrow as two texels.
-    blocks = light.reshape(side // 2, 2, side // 2, 2, 3)
-    source = np.ascontiguousarray(blocks.mean(axis=(1, 3)).reshape(-1, 3))
+    source = light.reshape(side // 2, 2, side // 2, 2, 3).mean(axis=(1, 3)).astype(np.float32)
+    # A lobe looks alike in all quarters of a map: they are filtered as twelve colours of one.
+    quarters = [source[::down, ::across] for down in (1, -1) for across in (1, -1)]
+    colors = np.ascontiguousarray(np.stack(quarters, axis=2).reshape(-1, 12))
     result = []
-    for number, (_, _, target) in enumerate(PROBE_MAPS[1:], 1):
-        alpha = (number / (len(PROBE_MAPS) - 1)) ** 2
-        way, _ = directions(target - 2, 1)
-        result.append(filter_lobe(way, *directions(side // 2, 1), source, alpha))
+    for number, (_, _, border) in enumerate(PROBE_MAPS[1:], 1):
+        alpha, target = (number / (len(PROBE_MAPS) - 1)) ** 2, border - 2
+        half = target // 2
+        filtered = weigh(_lobes(target, side // 2, alpha), colors).reshape(half, half, 2, 2, 3)
+        texels = np.empty((target, target, 3), np.float32)
+        for down, across in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            turned = texels[:: 1 - 2 * down, :: 1 - 2 * across]
+            turned[:half, :half] = filtered[:, :, down, across]
+        result.append(texels.reshape(-1, 3))
     return result
 
 
+@cache
+def _lobes(target: int, side: int, alpha: float) -> Singles:
+    """(m, side²) the shares of the texels of a map of ``side`` in what a surface of GGX ``alpha``
+    reflects towards each texel of the upper left quarter of one of ``target``, which is even; the
+    normal is that direction."""
+    half, (way, solid) = target // 2, directions(side, 1)
+    to = directions(target, 1)[0].reshape(target, target, 3)[:half, :half].reshape(-1, 3)
+    return share_lobes(to, way, solid, alpha)
+
+
 @kernel
-def filter_lobe(
-    target: NDArray[np.float64],
-    way: NDArray[np.float64],
-    solid: NDArray[np.float64],
-    light: NDArray[np.float64],
-    alpha: float,
-) -> NDArray[np.float64]:
-    """(m, 3) the light from (n, 3) directions of (n,) steradians that a surface of GGX ``alpha``
-    reflects towards each of (m, 3) directions, its normal being that direction."""
-    result = np.zeros((len(target), 3))
+def share_lobes(
+    target: NDArray[np.float64], way: NDArray[np.float64], solid: NDArray[np.float64], alpha: float
+) -> NDArray[np.float32]:
+    """(m, n) the shares of (n, 3) directions of (n,) steradians; see `_lobes`."""
+    result = np.zeros((len(target), len(way)), np.float32)
     for t in range(len(target)):
         total = 0.0
         for s in range(len(way)):
@@ -236,12 +248,24 @@ def filter_lobe(
             if cosine <= 0:
                 continue
             across = 0.5 * (1 + cosine) * (alpha * alpha - 1) + 1
-            weight = solid[s] * cosine / (across * across)
-            total += weight
-            for c in range(3):
+            result[t, s] = solid[s] * cosine / (across * across)
+            total += result[t, s]
+        for s in range(len(way)):
+            result[t, s] /= total
+    return result
+
+
+@kernel
+def weigh(share: NDArray[np.float32], light: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(m, k) the product of (m, n) shares and (n, k) light, the same for any number of threads."""
+    result = np.zeros((len(share), light.shape[1]), np.float32)
+    for t in range(len(share)):
+        for s in range(len(light)):
+            weight = share[t, s]
+            if weight == 0:
+                continue
+            for c in range(light.shape[1]):
                 result[t, c] += weight * light[s, c]
-        for c in range(3):
-            result[t, c] /= total
     return result
 
 

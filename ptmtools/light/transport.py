@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Singles
+from ptmtools.arrays import Floats, Singles
 from ptmtools.jit import kernel
 from ptmtools.light.occlusion import (
     RAYS,
@@ -28,10 +28,10 @@ from ptmtools.light.occlusion import (
     Occluders,
     hemisphere,
     normals,
-    tangent_frames,
+    rays_over,
     turns,
 )
-from ptmtools.light.patches import LightPatches, patch_number
+from ptmtools.light.patches import LightPatches, are_small, patch_number
 
 #: Passes, rays of a patch in each, and how many of the last passes count.
 PASSES, PASS_RAYS, COUNTED = 12, 4, 4
@@ -81,21 +81,28 @@ class LightField:
     daylight: Daylight
 
     def gather(
-        self, point: Floats, normal: Floats, turn: Floats, samples: int, near: float = 0.0
+        self,
+        point: Floats,
+        normal: Floats,
+        turn: Floats,
+        rays: int | Singles,
+        near: float = 0.0,
     ) -> Arrived:
-        """What reaches (n, 3) points with (n, 3) unit normals by a number of rays each.
+        """What reaches (n, 3) points with (n, 3) unit normals by a number of rays each,
+        or those of a (rays, 3) fan over z.
 
         turn: (n,) rotation of the directions about the normals, in turns from 0 to 1.
         near: see `Arrived`, metres.
         """
         count = len(point)
         arrived = Arrived(*(np.empty((count, k), np.float32) for k in (3, 1, 1)))
-        fan, step = hemisphere(samples), max(1, RAYS // samples)
+        fan = hemisphere(rays) if isinstance(rays, int) else rays
+        samples = len(fan)
+        step = max(1, RAYS // samples)
         for at in range(0, len(point), step):
             part = slice(at, at + step)
-            along = (fan @ tangent_frames(normal[part], turn[part])).reshape(-1, 3)
             start = point[part] + self.around.lift * normal[part] - self.around.middle
-            origin = np.repeat(start, samples, axis=0)
+            origin, along = rays_over(start, np.ascontiguousarray(normal[part]), turn[part], fan)
             for whole, some in zip(
                 arrived, self._receive(origin, along, samples, near), strict=True
             ):
@@ -103,19 +110,16 @@ class LightField:
         return Arrived(arrived.light, arrived.blocked[:, 0], arrived.variance[:, 0])
 
     def _receive(
-        self, origin: Floats, along: Singles, samples: int, near: float
+        self, origin: Singles, along: Singles, samples: int, near: float
     ) -> tuple[Singles, Singles, Singles]:
         if self.around.tree is None:
             sky = np.where(along[:, 1:2] >= 0, self.daylight.sky, self.daylight.ground)
             mean = sky.reshape(-1, samples, 3).mean(axis=1)
             nothing = np.zeros((len(mean), 1), np.float32)
             return mean.astype(np.float32), nothing, nothing
-        hit = self.around.tree.run(
-            origin.astype(np.float32), np.ascontiguousarray(along, np.float32), output=True
-        )
-        facing = np.einsum("nx,nx->n", hit["Ng"], along) < 0
+        hit = self.around.tree.run(origin, along, output=True)
         return receive(
-            hit["primID"], hit["u"], hit["v"], hit["tfar"], facing, along[:, 1].copy(),
+            hit["primID"], hit["u"], hit["v"], hit["tfar"], hit["Ng"], along,
             self.patches.split, self.patches.first, self.radiance,
             self.daylight.sky, self.daylight.ground, samples, near,
         )  # fmt: skip
@@ -141,18 +145,25 @@ def transport(
     radiance = (before + emission).astype(np.float32)
     emitted = np.broadcast_to(emission, radiance.shape)
     field = LightField(around, patches, radiance, daylight)
-    step, counted = max(1, RAYS // PASS_RAYS), min(COUNTED, passes)
-    spread, area = turns(patches.count), patches.areas()[face]
+    spread, area, counted = turns(patches.count), patches.areas()[face], min(COUNTED, passes)
+    small = are_small(area)
+    groups = [np.flatnonzero(~small), np.flatnonzero(small)]
     sums: list[float] = []
     light, total = np.zeros((2, patches.count, 3))
+    fan = hemisphere(PASS_RAYS)
     for turn in range(passes):
-        for at in range(0, patches.count, step):
-            part = slice(at, at + step)
-            shift = spread[part] + turn * SPREAD[1]
-            across, along = (shift * 7 + SPREAD[0] * turn) % 1.0, (shift * 3) % 1.0
-            point = patches.points(face[part], number[part], across, along)
-            light[part] = field.gather(point, normal[part], shift % 1.0, PASS_RAYS).light
-            radiance[part] = reflected[part] * (direct[part] + light[part]) + emitted[part]
+        for group, apart in zip(groups, (2, 4), strict=True):
+            # Passes that do not count, and those of small patches, share the rays of one fan.
+            apart = 1 if apart == 2 and turn >= passes - counted else apart
+            rays = np.ascontiguousarray(fan[turn % apart :: apart])
+            step = max(1, RAYS // len(rays))
+            for at in range(0, len(group), step):
+                part = group[at : at + step]
+                shift = spread[part] + turn * SPREAD[1]
+                across, along = (shift * 7 + SPREAD[0] * turn) % 1.0, (shift * 3) % 1.0
+                point = patches.points(face[part], number[part], across, along)
+                light[part] = field.gather(point, normal[part], shift % 1.0, rays).light
+                radiance[part] = reflected[part] * (direct[part] + light[part]) + emitted[part]
         if turn >= passes - counted:
             total += light
         sums.append(float((area * light.mean(axis=1)).sum()))  # a dot product follows the threads
@@ -180,8 +191,8 @@ def receive(
     u: NDArray[np.float32],
     v: NDArray[np.float32],
     length: NDArray[np.float32],
-    facing: Bools,
-    upwards: NDArray[np.float32],
+    across: NDArray[np.float32],
+    along: NDArray[np.float32],
     split: NDArray[np.int32],
     first: NDArray[np.int64],
     radiance: NDArray[np.float32],
@@ -190,7 +201,8 @@ def receive(
     samples: int,
     near: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """The fields of `Arrived`, the last two (n, 1), for ``samples`` rays of each point."""
+    """The fields of `Arrived`, the last two (n, 1), for ``samples`` rays of each point, which go
+    ``along`` and meet faces with normals ``across``, of any length."""
     count = len(face) // samples
     light, blocked = np.zeros((count, 3), np.float32), np.zeros((count, 1), np.float32)
     variance = np.zeros((count, 1), np.float32)
@@ -201,12 +213,15 @@ def receive(
             f = face[ray]
             r, g, b = 0.0, 0.0, 0.0
             if f < 0:
-                if upwards[ray] >= 0:
+                if along[ray, 1] >= 0:
                     r, g, b = sky[0], sky[1], sky[2]
                 else:
                     r, g, b = ground[0], ground[1], ground[2]
             else:
-                start = first[f, 0 if facing[ray] else 1]
+                facing = 0.0
+                for axis in range(3):
+                    facing += across[ray, axis] * along[ray, axis]
+                start = first[f, 0 if facing < 0 else 1]
                 if start < 0 or length[ray] < near:
                     stopped += 1
                 if start >= 0:

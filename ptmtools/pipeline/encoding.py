@@ -152,8 +152,8 @@ def bake_textures(
     return results, total
 
 
-#: Times that an image of codes is encoded.
-_TRIES = 3
+#: Times that an image of codes is encoded, at most, and the mean error that needs no other.
+_TRIES, _UNSEEN = 3, 0.1
 
 
 def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tuple[str, bytes]:
@@ -181,6 +181,8 @@ def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tupl
         data = image_bytes(rounded, name, quality[name], **full)
         error = (decode_preview(data, 3) - texels).mean(axis=(0, 1), dtype=np.float64)
         tries.append((float(np.abs(error).max()), data))
+        if tries[-1][0] <= _UNSEEN:
+            break
         moved += error
     return name, min(tries, key=lambda attempt: attempt[0])[1]
 

@@ -32,7 +32,6 @@ from ptmtools.light.occlusion import (
     normals,
     points_on,
     spread_over,
-    tangent_frames,
     turns,
 )
 
@@ -223,3 +222,19 @@ def _fans(
         along = (fan @ tangent_frames(normal[part], turn[part])).reshape(-1, 3)
         lifted = point[part] + around.lift * normal[part] - around.middle
         yield part, np.repeat(lifted, samples, axis=0), along
+
+
+def tangent_frames(normal: Floats, turn: Floats) -> Singles:
+    """(n, 3, 3) rows: two tangents, turned, and the normal."""
+    # Duff et al. 2017, without a branch but for the sign.
+    x, y, z = normal.T
+    sign = np.where(z < 0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    second = np.stack([b, sign + y * y * a, -y], axis=1)
+    angle = 2 * math.pi * turn
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return np.stack([c * first + s * second, c * second - s * first, normal], axis=1).astype(
+        np.float32
+    )

@@ -16,8 +16,10 @@ from ptmtools.light.model import PROBE_MAPS, PROBE_SIZE, coded_light
 from ptmtools.light.probes import (
     Probe,
     ProbeBaking,
+    _prefilter,
     directions,
-    filter_lobe,
+    share_lobes,
+    weigh,
     with_border,
 )
 from ptmtools.light.reflectance import SmallImages
@@ -126,14 +128,26 @@ def test_a_border_repeats_its_neighbours_on_the_sphere() -> None:
 def test_lobes_keep_even_light_and_lean_to_their_side(alpha: float) -> None:
     way, solid = directions(63, 1)
     target = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
-    even = filter_lobe(target, way, solid, np.ones((len(way), 3)), alpha)
-    assert even == pytest.approx(1)
-    above = np.repeat(way[:, 1:2] > math.cos(0.3), 3, axis=1).astype(float)
-    shine = filter_lobe(target, way, solid, above, alpha)
+    share = share_lobes(target, way, solid, alpha)
+    assert share.sum(axis=1) == pytest.approx(1)
+    above = (way[:, 1:2] > math.cos(0.3)).astype(np.float32)
+    shine = weigh(share, above)
     angle = np.linspace(0, math.pi / 2, 10_000)
     lobe = ((1 + np.cos(angle)) / 2 * (alpha**2 - 1) + 1) ** -2 * np.cos(angle) * np.sin(angle)
     assert shine[0, 0] == pytest.approx(lobe[angle < 0.3].sum() / lobe.sum(), rel=0.03)
     assert shine[1, 0] == 0
+
+
+def test_each_quarter_of_a_map_has_the_light_of_its_own_directions() -> None:
+    side = PROBE_MAPS[0][2] - 2
+    light = np.random.default_rng(0).random((side * side, 3)) ** 8
+    way, solid = directions(side // 2, 1)
+    source = light.reshape(side // 2, 2, side // 2, 2, 3).mean(axis=(1, 3)).reshape(-1, 3)
+    for number, texels in enumerate(_prefilter(light), 1):
+        alpha = (number / (len(PROBE_MAPS) - 1)) ** 2
+        target, _ = directions(PROBE_MAPS[number][2] - 2, 1)
+        share = share_lobes(target, way, solid, alpha)
+        assert texels == pytest.approx(share @ source, rel=1e-4)
 
 
 def test_a_piece_is_the_one_that_holds_the_point_on_its_side() -> None:

@@ -341,7 +341,7 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 8
+    recipe = 9
     changed = "white is balanced; faces reflect as their part of an image does"
     options = LightOptions
     heeds = (TEXTURES,)
