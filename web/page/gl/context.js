@@ -11,3 +11,13 @@ export function contextOf(canvas, low) {
   const gl = (low ? null : canvas.getContext("webgl2", options)) ?? canvas.getContext("webgl2", plain);
   return /** @type {WebGL2RenderingContext | null} */ (gl);
 }
+
+/**
+ * Whether a graphics card draws, for a visitor who wants all of its quality.
+ * @param {WebGL2RenderingContext} gl
+ */
+export function isCard(gl) {
+  const names = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+  return gl.getContextAttributes()?.antialias && !/swiftshader|llvmpipe|basic render/i.test(name);
+}

@@ -3,13 +3,14 @@
 // shrinking mean another storage.
 
 import { withOffset } from "../../client/src/levels.js";
+import { isCard } from "./context.js";
 
 /** Bytes of one upload: a stripe of this size blocks for 7 ms at most, a whole level of 2048² for 137. */
 export const STRIPE = 256 << 10;
 /** Seconds in which a new level fades in. */
 const FADE = 0.3;
 /** Texels along the line of sight that a graphics card averages where a surface is seen from the side. */
-const SLANT = 4;
+const ANISOTROPY = 4;
 
 /**
  * Formats by channels on the GPU, which has no texels of three bytes.
@@ -85,9 +86,9 @@ export class Storage {
    * @param {boolean} clampU
    * @param {boolean} clampV
    * @param {number} now s
-   * @param {boolean} [chart] whether it has parts that do not belong together
+   * @param {boolean} [atlas] whether it has parts that do not belong together
    */
-  bind(clampU, clampV, now, chart) {
+  bind(clampU, clampV, now, atlas) {
     const { gl } = this, wrap = +clampU + 2 * +clampV;
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
     if (wrap !== this.#wrap) {
@@ -95,10 +96,8 @@ export class Storage {
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, s);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, t);
       this.#wrap = wrap;
-      // As smooth edges, it costs too much without a graphics card.
-      const card = !chart && gl.getContextAttributes()?.antialias;
-      const slanted = card && gl.getExtension("EXT_texture_filter_anisotropic");
-      if (slanted) gl.texParameterf(gl.TEXTURE_2D, slanted.TEXTURE_MAX_ANISOTROPY_EXT, SLANT);
+      const anisotropic = !atlas && isCard(gl) && gl.getExtension("EXT_texture_filter_anisotropic");
+      if (anisotropic) gl.texParameterf(gl.TEXTURE_2D, anisotropic.TEXTURE_MAX_ANISOTROPY_EXT, ANISOTROPY);
     }
     if (!this.#fading) return false;
     const left = this.#fading * Math.max(0, 1 - (now - this.#since) / FADE);
