@@ -152,7 +152,7 @@ def read(target: Target, watch: Watch, case: Case, number: int, slow: float, bat
     done = watch.end()
     took = time.process_time() - start
     grown = most_memory() - before
-    if compilations() != compiled:
+    if compilations() != compiled and not (fault or done):
         read(target, watch, case, number, slow, batch)
         return
     batch.outcomes[outcome] += 1

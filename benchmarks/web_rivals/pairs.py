@@ -19,6 +19,7 @@ import random
 import subprocess
 import sys
 from collections import Counter
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,8 @@ def main() -> None:
     file = given.out / "key.json"
     key: dict[str, str] = json.loads(file.read_text("utf-8")) if file.exists() else {}
     ours = str(Path(sys.executable).with_name("ptm"))
+    # A name of a program tells the judge nothing.
+    kind = sha256(given.rival.encode()).hexdigest()[:4]
     for model in given.models:
         lot = random.Random(f"{given.seed} {model.stem} {given.rival}")
         database = build(ours, model, given.out, "ours")
@@ -64,10 +67,10 @@ def main() -> None:
         if given.rival == "three":
             rivals = draw_by_three(model, database, views)
         else:
-            other = build(given.rival, model, given.out, "other")
+            other = build(given.rival, model, given.out, kind)
             rivals = [draw(given.rival, other, view, given.out) for view in views]
         for number, (picture, rival) in enumerate(zip(pictures, rivals, strict=True)):
-            name, left = f"{model.stem}-{number}", lot.random() < 0.5
+            name, left = f"{model.stem}-{kind}-{number}", lot.random() < 0.5
             key[name] = "left" if left else "right"
             both = (picture, rival) if left else (rival, picture)
             Image.fromarray(np.concatenate(both, axis=1)).save(given.out / f"{name}.png")
