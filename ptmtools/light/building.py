@@ -63,8 +63,8 @@ _SAMPLES, _RAYS = 4096, 32
 _DARK, _MANY, _LIFT = 0.02, 0.03, 0.5
 #: Passes for what ceilings add to a light in balance.
 _AGAIN = 6
-#: Points of a face, one of a small one, and rays from each, that tell which side is brighter; sides
-#: are alike up to this ratio of their light.
+#: Points of a face, and rays from each, that tell which side is brighter; sides are alike up to
+#: this ratio of their light.
 _SIDE_POINTS, _SIDE_RAYS, _ALIKE = 4, 8, 2.0
 #: Share of rays to what is nearer than half a texel, or to the inside of walls, from which on a
 #: point is covered.
@@ -105,13 +105,12 @@ class BuildingLight:
         wanted = area > 0
         plane = planes(corner, normal, wanted)
         along = np.where(np.einsum("tx,tx->t", normal, normal[plane]) < 0, -1.0, 1.0)
-        count = np.where(are_small(area), 1, _SIDE_POINTS)
-        face = np.repeat(np.arange(len(corner)), count)
-        point = points_on(corner[face], np.arange(len(face)) - (np.cumsum(count) - count)[face])
+        face = np.repeat(np.arange(len(corner)), _SIDE_POINTS)
+        point = points_on(corner[face], np.tile(np.arange(_SIDE_POINTS), len(corner)))
         turn, sums = turns(len(face)), []
         for sign in (1.0, -1.0):
             light = self._light(point, sign * normal[face], turn, _SIDE_RAYS)
-            sums.append(sum_by_group(face, luminance(light), len(corner)) / count)
+            sums.append(luminance(light).reshape(-1, _SIDE_POINTS).mean(axis=1))
         front, back = sums
         difference = sum_by_group(plane, along * area * (front - back), len(corner))[plane]
         alike = np.maximum(front, back) < _ALIKE * np.minimum(front, back)

@@ -83,7 +83,8 @@ class CellLight:
     ----------
     white: the light of which texels and `vertex` are shares.
     texels: (side, side, 3) codes, see `light_codes`; None without a lightmap.
-    exposure: (3,) logarithms of the factors of red, green and blue by itself, see `_exposure`.
+    exposure, balance: logarithms of the factor with which it shows by itself, and (3,) of those of
+        red, green and blue beside it, see `_exposure`.
     area: of its lit surfaces, m².
     crowded: whether neighbours in the lightmap run into each other.
     density: texels to the metre, of those that were asked for; 1 without a lightmap.
@@ -95,7 +96,8 @@ class CellLight:
     vertex: NDArray[np.uint8]
     white: float
     texels: Singles | None
-    exposure: Floats
+    exposure: float
+    balance: Floats
     area: float
     crowded: bool
     density: float = 1.0
@@ -147,7 +149,7 @@ class LightBaking:
         sample, weight = np.concatenate(samples), np.concatenate(weights)
         white = self._white(sample, weight)
         reflectance = self.reflectance[np.concatenate(faces)]
-        exposure, lit_area = _exposure(sample.astype(np.float64), reflectance, weight)
+        shown = _exposure(sample.astype(np.float64), reflectance, weight)
         shares = encode_srgb(vertex.astype(np.float64) / white)
         return CellLight(
             mapped,
@@ -156,8 +158,7 @@ class LightBaking:
             np.where(dense[:, None, None], shares, np.uint8(255)),
             white,
             None if texels is None else light_codes(texels, white),
-            exposure,
-            lit_area,
+            *shown,
             *rest,
         )
 
@@ -203,7 +204,8 @@ class LightBaking:
             look = self._look(piece, corner, side, rows, 1.0)
             return np.repeat(look(grid.face, point, turn), 3, axis=1)
         near = 0.5 * grid.texel
-        first = math.ceil(self.options.light_samples * _FIRST)
+        # Of one ray no variance is known.
+        first = max(2, math.ceil(self.options.light_samples * _FIRST))
         lit = self.building.look(corner[rows], side[rows], first, near)
         light, variance, covered = lit.indirect(grid.face, point, turn)
         # What few rays meet, as a window far away, is missed by most of the texels around.
@@ -250,14 +252,14 @@ def _brighten(painted: PaintedLight) -> Look:
     return look
 
 
-def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[Floats, float]:
-    """(3,) logarithms of the factors with which (n, 3) light of this weight shows on surfaces of
-    (n,) reflectance, and the weight of what is not black."""
+def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[float, Floats, float]:
+    """Logarithms of the factor with which (n, 3) light of this weight shows on surfaces of (n,)
+    reflectance, and (3,) of those that balance white; the weight of what is not black."""
     bright = luminance(light)
     radiance = bright * reflectance
     shows = np.flatnonzero((radiance > 0) & (weight > 0))
     if not len(shows):
-        return np.zeros(3), 0.0
+        return 0.0, np.zeros(3), 0.0
     order = shows[np.argsort(radiance[shows], kind="stable")]
     total = np.cumsum(weight[order])
     # No dot product: its rounding follows the number of threads.
@@ -269,7 +271,7 @@ def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[Floa
     balanced = (1 - _ADAPTATION) * tint
     # A white surface keeps its luminance.
     kept = np.log(luminance(np.exp(tint)) / luminance(np.exp(balanced)))
-    return exposure + balanced - tint + kept, float(total[-1])
+    return exposure, balanced - tint + kept, float(total[-1])
 
 
 def _objects(number: Ints, chosen: Bools) -> list[Ints]:

@@ -18,13 +18,15 @@ from ptmtools.jit import inlined_kernel, kernel
 
 #: Largest number of parts of an edge; the patches of a face of a kilometre are larger.
 _MOST = 256
-#: Surfaces of less than this share of the usual area matter little by themselves.
-_SMALL = 0.1
+#: Patches of less than this share of the usual area matter little by themselves; that is at most
+#: the second number, m², however large the ground is.
+_SMALL, _USUAL = 0.1, 0.2
 
 
 def are_small(area: Floats) -> Bools:
-    """(n,) which of some areas are small beside their mean, weighted by themselves."""
-    return np.asarray(area * area.sum() < _SMALL * (area**2).sum())
+    """(n,) which areas of patches are small beside their mean, weighted by themselves."""
+    usual = (area**2).sum() / max(float(area.sum()), 1e-300)
+    return np.asarray(area < _SMALL * min(usual, _USUAL))
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """The colours of images where faces show them, from levels of at most `SIDE` texels: what surfaces
 reflect, and what is seen in reflections.
 
-A face that shows most of an image, or repeats it, has the mean of all of it. One that shows a part,
-as of an atlas, has the mean of that part, by as many points as it has texels.
+A face that shows half of an image or more has the mean of all of it. One that shows a part, as of
+an atlas, has the mean of that part, by as many points as it has texels, up to `_POINTS`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ptmtools.scene.model import Scene
 #: Texels of the longer side of an image, at most.
 SIDE = 64
 #: Points of a face, at most; and the share of an image from which on it has the colour of all.
-_POINTS, _WHOLE = 32, 0.5
+_POINTS, _WHOLE = 32, 0.45
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ def image_colors(scene: Scene, images: SmallImages, mean: Floats) -> Floats:
         np.divide(mean[number], small, out=lost[number], where=small > 0)
     for k in range(_POINTS):
         more = np.flatnonzero(~whole & (count > k))
-        # Points of a triangle with little discrepancy: those of a square, folded.
-        u, v = (0.5 + k * 0.7548777) % 1, (0.5 + k * 0.5698403) % 1
+        # Points of a triangle with little discrepancy, those of a square, folded: first its middle.
+        u, v = (1 / 3 + k * 0.7548777) % 1, (1 / 3 + k * 0.5698403) % 1
         u, v = (u, v) if u + v <= 1 else (1 - u, 1 - v)
         at = a[more] + u * (b[more] - a[more]) + v * (c[more] - a[more])
         total[more] += images.texels(image[rows[more]], at)

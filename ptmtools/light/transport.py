@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -149,13 +150,13 @@ def transport(
     small = are_small(area)
     groups = [np.flatnonzero(~small), np.flatnonzero(small)]
     sums: list[float] = []
-    light, total = np.zeros((2, patches.count, 3))
+    light, earlier, total = np.zeros((3, patches.count, 3))
     fan = hemisphere(PASS_RAYS)
     for turn in range(passes):
-        for group, apart in zip(groups, (2, 4), strict=True):
-            # Passes that do not count, and those of small patches, share the rays of one fan.
-            apart = 1 if apart == 2 and turn >= passes - counted else apart
-            rays = np.ascontiguousarray(fan[turn % apart :: apart])
+        # Passes that do not count, and those of small patches, share the rays of one fan.
+        strides = 1 if turn >= passes - counted else 2, PASS_RAYS
+        for group, stride in zip(groups, strides, strict=True):
+            rays = np.ascontiguousarray(fan[turn % stride :: stride])
             step = max(1, RAYS // len(rays))
             for at in range(0, len(group), step):
                 part = group[at : at + step]
@@ -167,21 +168,24 @@ def transport(
         if turn >= passes - counted:
             total += light
         sums.append(float((area * light.mean(axis=1)).sum()))  # a dot product follows the threads
-        if turn == passes - counted - 1:
-            radiance[:] = reflected * (direct + extrapolation(sums) * light) + emitted
+        if turn == passes - counted - 1 and turn:
+            # Two passes have all rays of the fan.
+            factor = extrapolation([(a + b) / 2 for a, b in pairwise(sums)])
+            radiance[:] = reflected * (direct + factor * (light + earlier) / 2) + emitted
+        earlier[:] = light
     radiance[:] = reflected * (direct + total / counted) + emitted
     return field
 
 
 def extrapolation(sums: Sequence[float]) -> float:
-    """The factor from the last of some sums to their limit: each pass adds the same share of what
-    the one before added. 1 for fewer than three sums."""
-    if len(sums) < 3:
+    """The factor from the last of some sums to their limit: two passes, which have other rays, add
+    the same share of what the two before added. 1 for fewer than five sums."""
+    if len(sums) < 5:
         return 1.0
-    before, last = sums[-2] - sums[-3], sums[-1] - sums[-2]
+    before, last = sums[-3] - sums[-5], sums[-1] - sums[-3]
     if not 0 < last < before:
         return 1.0
-    share = min(last / before, MOST_REFLECTED)
+    share = min(last / before, MOST_REFLECTED**2)
     return 1 + last * share / (1 - share) / sums[-1]
 
 

@@ -173,7 +173,7 @@ def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tupl
     full = {"subsampling": "4:4:4"} if name == "avif" else {}
     tries: list[tuple[float, bytes]] = []
     moved = np.zeros(3)
-    row, column, channel = np.indices(texels.shape)
+    row, column, channel = np.ogrid[tuple(map(slice, texels.shape))]
     # A sequence with little discrepancy in two dimensions (Roberts).
     noise = (0.7548777 * row + 0.5698403 * column + channel / 3) % 1 - 0.5
     for _ in range(_TRIES):

@@ -32,12 +32,12 @@ def test_damaged_buildings_become_sound_databases() -> None:
 def test_leaves_that_are_thin_for_kilometres(base: str, number: int) -> None:
     """float32 bends a leaf of the first; every face of one of the second is narrower than the
     on-plane distance."""
-    assert fuzz(base, seed=94, start=number, count=1, light=False).tally.findings == []
+    assert fuzz(base, seed=94, start=number, count=1).tally.findings == []
 
 
 def test_a_door_leaf_that_is_open_above() -> None:
     """An eye inside of it belongs to the cells on both sides."""
-    assert fuzz("doors", seed=95, start=631, count=1, light=False).tally.findings == []
+    assert fuzz("doors", seed=95, start=631, count=1).tally.findings == []
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -176,8 +176,17 @@ def test_extremes_give_numbers(
     assert result.texels is not None
     assert math.isfinite(result.white)
     assert result.white > 0
-    assert all(map(math.isfinite, result.exposure))
+    assert math.isfinite(result.exposure)
+    assert np.isfinite(result.balance).all()
     assert result.texels.max() > 200
+
+
+@pytest.mark.parametrize("albedo", [0.5, 0.8, 0.9])
+def test_all_bounces_count(albedo: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many passes as it takes bring hardly more light than the usual number."""
+    usual = lit(room(), None, albedo).usual
+    monkeypatch.setattr("ptmtools.light.building.PASSES", 80)
+    assert usual == pytest.approx(lit(room(), None, albedo).usual, rel=0.02)
 
 
 @pytest.mark.parametrize("walls", [(0.8, 0.3, 0.3), (0.5, 0.5, 0.5), (0.3, 0.3, 0.8)])
@@ -191,7 +200,7 @@ def test_white_is_balanced(walls: tuple[float, float, float]) -> None:
     assert result.texels is not None
     light = coded_light(result.texels, result.white).reshape(-1, 3)
     before = np.diff(np.log(light).mean(axis=0))
-    after = before + np.diff(result.exposure)
+    after = before + np.diff(result.balance)
     np.testing.assert_allclose(after, 0.3 * before, atol=0.03)
     strength = np.abs(before).max()
     assert strength < 0.1 if len(set(walls)) == 1 else strength > 0.3
@@ -204,7 +213,8 @@ def test_a_pane_is_no_surface_of_the_light() -> None:
     building = BuildingBaking(scene, [glass], None, np.full((12, 3), 0.5)).light()
     result = LightBaking(OPTIONS, building, None, np.full(12, 0.5, np.float32)).light(glass)
     assert not result.lit.any()
-    assert result.area == 0
+    assert (result.exposure, result.area) == (0, 0)
+    assert not result.balance.any()
 
 
 def test_a_texel_beside_a_thin_wall_has_no_light_of_the_other_side() -> None:

@@ -181,8 +181,8 @@ def test_a_cell_without_surfaces() -> None:
     result = baking_of(corner, piece(corner)).light(piece(np.zeros((0, 3, 3))))
     assert result.texels is None
     assert not len(result.mapped)
-    assert result.area == 0
-    assert not result.exposure.any()
+    assert (result.exposure, result.area) == (0, 0)
+    assert not result.balance.any()
 
 
 def test_light_does_not_lead_over_edges_or_to_the_other_side() -> None:

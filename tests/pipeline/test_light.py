@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ from tests.systems.apo.statues import write_rooms
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
 
 QUICK = AchOptions(samples=4, backend="embree")
-BAKE, PLAIN = LightOptions("bake", light_samples=4), LightOptions("none")
+BAKE, PLAIN = LightOptions("bake", light_samples=16), LightOptions("none")
 
 
 def built(model: Path, db: Path, *options: Any, workers: int = 1) -> list[str]:
@@ -303,3 +304,15 @@ def test_a_lightmap_of_another_cell(folder: Path) -> None:
     (db / "www/hints.json").write_text(changed)
     messages = [issue.message for issue in validate(db).issues]
     assert sum("is not the lightmap of this cell" in message for message in messages) >= 2
+
+
+def test_a_dark_cell_has_white_in_balance() -> None:
+    """Of cells with red light, one is lit far less than the others: two stops, and their hue."""
+    from ptmtools.pipeline.stages.light import _exposures
+
+    hue = np.array([-0.4, 0.1, 0.3])
+    lights: Any = [SimpleNamespace(exposure=x, balance=hue, area=1.0) for x in (0.0, 0.0, 9.0)]
+    cells: Any = SimpleNamespace(standing=np.array([1, 1, 0]), adjacent=lambda: [[1], [0], []])
+    factor, exposure = _exposures(lights, cells)
+    assert factor == 1
+    np.testing.assert_allclose(exposure, np.exp(hue) * [[1], [1], [4]])

@@ -234,24 +234,23 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
     red, green and blue of cells: some of what is seen from a cell is in its neighbours."""
     import numpy as np
 
-    from ptmtools.scene.colors import luminance
-
-    wanted = np.array([light.exposure for light in cell_lights]).reshape(-1, 3)
+    wanted = np.array([light.exposure for light in cell_lights])
+    balance = np.array([light.balance for light in cell_lights]).reshape(-1, 3)
     area = np.array([light.area for light in cell_lights])
     standing = area * (cells.standing if (area * cells.standing).any() else 1)
     if not standing.any():
         return 1.0, np.ones((len(area), 3))
-    of_white = np.log(luminance(np.exp(wanted)))
-    usual = float((standing * of_white).sum() / standing.sum())
-    total, weight = wanted * area[:, None], area.copy()
+    usual = float((standing * wanted).sum() / standing.sum())
+    values = np.column_stack([wanted - usual, balance])
+    total, weight = values * area[:, None], area.copy()
     for cell, near in enumerate(cells.adjacent()):
         # A large hall beside a small room is seen through a door.
         beside = np.minimum(area[near], area[cell]) / 4
-        total[cell] += (wanted[near] * beside[:, None]).sum(axis=0)
+        total[cell] += (values[near] * beside[:, None]).sum(axis=0)
         weight[cell] += beside.sum()
-    wished = np.full_like(wanted, usual)
-    wished[weight > 0] = total[weight > 0] / weight[weight > 0, None]
-    return math.exp(usual), np.exp(np.clip(wished - usual, -_MOST_STOPS, _MOST_STOPS))
+    wished = np.divide(total, weight[:, None], out=np.zeros_like(total), where=weight[:, None] > 0)
+    limited = np.clip(wished[:, :1], -_MOST_STOPS, _MOST_STOPS)
+    return math.exp(usual), np.exp(limited + wished[:, 1:])
 
 
 def _notes(lights: list[CellLight]) -> Iterator[str]:
@@ -341,7 +340,7 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 9
+    recipe = 10
     changed = "white is balanced; faces reflect as their part of an image does"
     options = LightOptions
     heeds = (TEXTURES,)
