@@ -50,8 +50,9 @@ _MORE = ((0.1, 1), (0.3, 6))
 _DIM, _AGAIN = 0.1, 0.381966
 #: Differences of light by this share of the usual one do not show.
 _LEAST = 0.01
-#: The share of a cell's light that its white is not less than.
-_WHITE = 0.995
+#: The share of a cell's light that its white is not less than, and how much more it is, so that
+#: codes of bright light have room for their hue.
+_WHITE, _ROOM = 0.995, 1.9
 #: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
 #: and the share of the surfaces that is no brighter than the other number, so that white walls keep
 #: their texture.
@@ -240,7 +241,7 @@ class LightBaking:
         if self.building is None:
             return 1.0
         bright = light[weight > 0].max(axis=1, initial=0.0)
-        white = float(np.quantile(bright, _WHITE)) if len(bright) else 0.0
+        white = _ROOM * float(np.quantile(bright, _WHITE)) if len(bright) else 0.0
         # Three digits, as in GLBs.
         return float(f"{white:.3g}") if white > 0 else self.building.usual
 

@@ -45,6 +45,19 @@ PROBE_SIZE = 192, 128
 PROBE_MAPS = ((0, 0, 128), (128, 0, 64), (128, 64, 32), (160, 64, 16))
 
 
+#: Images of lightmaps have this multiple of the hue of codes: chroma of whole numbers would show as
+#: patches on white walls.
+HUE = 3.0
+#: Shares of red, green and blue in the luma of images (ITU-R BT.601).
+LUMA = np.array([0.299, 0.587, 0.114])
+
+
+def scale_hue(codes: Floats | Singles, factor: float) -> Floats:
+    """(..., 3) codes with the same luma and a multiple of their differences from it."""
+    luma = np.asarray(codes @ LUMA)[..., None]
+    return np.asarray(luma + factor * (codes - luma))
+
+
 def light_codes(light: Floats | Singles, white: float) -> Singles:
     """Light of any shape as codes, 0 to 255, not rounded: white is 255, and half of it 255 /
     `STOPS` less."""
@@ -99,7 +112,7 @@ class Light:
         if not self.toned:
             return {"stops": STOPS, "tone": "plain"}
         sky, ground = np.round(self.horizon, 4).tolist()
-        return {"stops": STOPS, "tone": tone, "sky": sky, "ground": ground}
+        return {"stops": STOPS, "hue": HUE, "tone": tone, "sky": sky, "ground": ground}
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The light as plain arrays."""

@@ -1,10 +1,10 @@
 """Display of baked light: a lit surface has a linear radiance, which exposure and tone curve bring
 to the screen (docs/formats/hints.md, Colours).
 
-A texel of a lightmap is a code of the logarithm of light, c of 0 to 255: `light` is
-white · 2^(stops · (c / 255 − 1)), and at vertices the light is in their colours, as a share of
-white. The radiance of the surface is base · light, with the linear product of texel, factor and
-colour of the vertex as its base.
+A texel of a lightmap holds codes of the logarithm of light, with a multiple of their hue. For a
+code c of 0 to 255 `light` is white · 2^(stops · (c / 255 − 1)), and at vertices the light is in
+their colours, as a share of white. The radiance of the surface is base · light, with the linear
+product of texel, factor and colour of the vertex as its base.
 
 The curve "neutral" is Khronos PBR Neutral (https://github.com/KhronosGroup/ToneMapping) without its
 offset of 0.04, which makes up for reflections. It leaves radiance up to 0.8 as it is, so that
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.light.model import scale_hue
 from ptmtools.output.served import Served
 from ptmtools.output.surfaces import Surfaces
 from ptmtools.rendering.footprints import corner_values, show_colors
@@ -54,16 +55,18 @@ class Tone:
     stops: powers of two from code 0 to code 255. exposure: (3,) factors of radiance.
     curve: of `CURVES`, or "plain": radiance is clipped at 1.
     background: (2, 3) radiance of ground and sky; None: the background is `SKY`.
+    hue: the multiple of the hue of codes that lightmaps have.
     """
 
     stops: float
     exposure: Floats
     curve: str
     background: Floats | None
+    hue: float = 1.0
 
     def light(self, white: Floats, codes: Floats) -> Floats:
         """(n, 3) irradiance / π of (n, 3) codes, 0 to 255, and (n,) lights of the greatest code."""
-        scale = np.exp2((codes / 255 - 1) * self.stops)
+        scale = np.exp2((scale_hue(codes, 1 / self.hue) / 255 - 1) * self.stops)
         return np.asarray(white[:, None] * scale)
 
     def display(self, radiance: Floats) -> Floats:
@@ -95,7 +98,8 @@ def tone_of(index: Mapping[str, Any], cell: int = -1) -> Tone | None:
             exposure = np.array(index["cells"][cell].get("exposure", exposure), np.float64)
         if "sky" in head and "ground" in head:
             background = np.array([head["ground"], head["sky"]], np.float64)
-    return Tone(float(head["stops"]), exposure, head["tone"], background)
+    hue = float(head.get("hue", 1.0))
+    return Tone(float(head["stops"]), exposure, head["tone"], background, hue)
 
 
 def tone_at(served: Served, eye: Floats, cell: int | None = None) -> Tone | None:

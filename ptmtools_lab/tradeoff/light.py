@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints, areas
 from ptmtools.light.cells import CellLight, LightBaking
 from ptmtools.light.looks import LightImage, lookup
-from ptmtools.light.model import CellSurfaces, coded_light
+from ptmtools.light.model import HUE, CellSurfaces, coded_light, scale_hue
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
 from ptmtools.pipeline.encoding import lossy_codes
@@ -149,7 +149,8 @@ def _shown_light(
         return np.asarray(at_vertices)
     at = np.einsum("nk,nkx->nx", share, light.uv[face].astype(np.float64))
     codes = [lookup(LightImage(channel, ("clamp", "clamp")), at) for channel in _channels(image)]
-    mapped = coded_light(255 * np.stack(codes, axis=1).astype(np.float64), light.white)
+    code = scale_hue(255 * np.stack(codes, axis=1).astype(np.float64), 1 / HUE)
+    mapped = coded_light(code, light.white)
     return np.where(piece.dense[face, None], at_vertices, mapped)
 
 

@@ -60,7 +60,7 @@ from tests.lab.test_tone import (
 )
 
 Vector = list[float]
-MEAN, COLOR, OPACITY, EXPOSURE = 2.0, (200, 180, 210), 0.3, 0.7
+MEAN, COLOR, OPACITY, EXPOSURE = 2.0, (200, 180, 210), 0.3, (0.7, 0.8, 0.6)
 CENTRE, LOW, HIGH = [0.5, 0.3, 0.2], [-7.0, -5.0, -6.0], [7.0, 6.0, 5.0]
 PROBE = {"cell": 0, "white": 5.0, "mean": MEAN, "centre": CENTRE, "low": LOW, "high": HIGH}
 #: Metallic and roughness of the strips, the last of which is a pane.
@@ -225,7 +225,9 @@ def _expected(
     if strip == 0:
         base = [decoded(t / 255) * f for t, f in zip(TEXEL, FACTOR, strict=True)]
         share = min(max(2 * along - 0.5, 0), 1)
-        codes = [(1 - share) * a + share * b for a, b in zip(*CODES, strict=True)]
+        texel = [(1 - share) * a + share * b for a, b in zip(*CODES, strict=True)]
+        luma = dot(texel, [0.299, 0.587, 0.114])
+        codes = [luma + (t - luma) / NEUTRAL["hue"] for t in texel]
         light = [WHITE[0] * 2 ** (STOPS * (code / 255 - 1)) for code in codes]
     weight = (1 - along, along - up, up) if along > up else (1 - up, along, up - along)
     if strip == 1:

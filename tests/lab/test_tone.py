@@ -32,7 +32,7 @@ from ptmtools_lab.renderer import FrameRenderer
 from tests.lab.worlds import leaf
 
 STOPS, SKY_LIGHT, GROUND_LIGHT = 10, (0.7, 0.9, 1.3), (0.3, 0.25, 0.2)
-NEUTRAL = {"stops": STOPS, "tone": "neutral", "sky": SKY_LIGHT, "ground": GROUND_LIGHT}
+NEUTRAL = {"stops": STOPS, "hue": 2, "tone": "neutral", "sky": SKY_LIGHT, "ground": GROUND_LIGHT}
 PLAIN = {"stops": STOPS, "tone": "plain"}
 #: Texel of the image, of 255, and its linear factor; codes of the two texels of the lightmap.
 TEXEL, FACTOR = (200, 90, 30), (0.9, 0.5, 0.7)
@@ -157,7 +157,9 @@ def _expected(
         if tone is None:
             return [255 * encoded(f) * t / 255 for t, f in zip(TEXEL, FACTOR, strict=True)]
         share = min(max(2 * along - 0.5, 0), 1)
-        codes = [(1 - share) * a + share * b for a, b in zip(*CODES, strict=True)]
+        texel = [(1 - share) * a + share * b for a, b in zip(*CODES, strict=True)]
+        luma = sum(w * t for w, t in zip((0.299, 0.587, 0.114), texel, strict=True))
+        codes = [luma + (t - luma) / (NEUTRAL["hue"] if toned else 1) for t in texel]
         light = [WHITE[0] * 2 ** (STOPS * (code / 255 - 1)) for code in codes]
         return displayed([b * v for b, v in zip(base, light, strict=True)], exposure, toned)
     weight = (1 - along, along - up, up) if along > up else (1 - up, along, up - along)

@@ -14,7 +14,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import DatabaseError, InputError
-from ptmtools.light.model import coded_light
+from ptmtools.light.model import HUE, coded_light, scale_hue
 from ptmtools.light.options import LightOptions
 from ptmtools.output.gltf_reader import read_glb
 from ptmtools.output.options import EmitOptions
@@ -156,6 +156,7 @@ def test_lamps_of_a_model(tmp_path: Path) -> None:
     served = read_served(tmp_path / "1.db")
     for row in (row for row in served.index["textures"] if "light" in row):
         codes = load_image(served.file(row["previews"][-1]["file"])).array()
+        codes = scale_hue(codes.astype(float), 1 / HUE)
         shown = light.exposure[row["light"]] * coded_light(codes, light.white[row["light"]])
         assert 0.01 < shown.min() < 0.5
         assert shown.max() > 1

@@ -22,6 +22,7 @@ from tests.site.strips import (
     Z,
     changed,
     developed,
+    evened,
     glb,
     lit_site,
     row_of,
@@ -189,7 +190,7 @@ def mirrors_of(
     tilt = BENT * (2 * (at[..., 0] - LEFT) / (RIGHT - LEFT) - 1)
     bent = np.stack([tilt, 0 * tilt, np.full(tilt.shape, 100.0)], axis=-1)
     bent /= np.linalg.norm(bent, axis=-1, keepdims=True)
-    base, light = to_linear(np.array(BASE) / 255), WHITE * np.exp2(10 * (CODE / 255 - 1))
+    base, light = to_linear(np.array(BASE) / 255), WHITE * np.exp2(10 * (evened(CODE) / 255 - 1))
 
     def seen(normal: Floats, rough: float) -> tuple[Floats, Floats, Floats]:
         """What is reflected, and the split sum."""

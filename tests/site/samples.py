@@ -103,8 +103,7 @@ def _make_campus(folder: Path) -> None:
     (folder / "records").mkdir()
     (folder / "records/building_01_rectorate.html").write_text("<p>Built in 1903</p>")
     (folder / "records/building_02_medicine.html").write_text(HOSTILE)
-    # Without a far reach most texels have the light of their neighbours, and need no rays. Trees
-    # and lamps are a few objects together: each has lightmaps of up to 2048 texels a side.
-    options = CampusOptions(samples=4, reach=0.1, faces=50, small=20)
+    # Without a far reach most texels have the light of their neighbours, and need no rays.
+    options = CampusOptions(samples=4, reach=0.1, faces=50)
     reading, records = IngestOptions(unit="m"), folder / "records"
     make_campus(folder / "model/campus.obj", folder / "campus", options, reading, records=records)

@@ -31,7 +31,13 @@ STRIPS = {
 #: Eyes, one in each room, which look along -z; exposures of their cells.
 EYES = [(-1.5, 1.5, 0.0), (1.5, 1.5, 0.0)]
 EXPOSURE = [[0.6, 0.5, 0.7], [2.5, 3.0, 2.0]]
-LIGHT = {"stops": 10, "tone": "neutral", "sky": [0.5, 0.7, 1.4], "ground": [0.3, 0.2, 0.1]}
+LIGHT = {
+    "stops": 10,
+    "hue": 2,
+    "tone": "neutral",
+    "sky": [0.5, 0.7, 1.4],
+    "ground": [0.3, 0.2, 0.1],
+}
 #: Of the image, sRGB; the factors of the others, linear; white of lightmap and vertices.
 BASE, FACTOR = (180, 120, 60), (0.5, 0.7, 0.9)
 WHITE = {"mapped": 4.0, "bumpy": 4.0, "vertices": 2.0}
@@ -176,6 +182,12 @@ def developed(light: Floats, tone: str) -> Floats:
     return to_srgb(np.where(peak > 0.8, bright, light))
 
 
+def evened(texel: Floats) -> Floats:
+    """(..., 3) codes of texels."""
+    luma = (texel * [0.299, 0.587, 0.114]).sum(axis=-1, keepdims=True)
+    return np.asarray(luma + (texel - luma) / float(str(LIGHT["hue"])))
+
+
 def view_of(
     eye: tuple[float, float, float],
     angle: float,
@@ -196,6 +208,7 @@ def view_of(
     facing = 1 / np.sqrt(1 + across**2 + up**2)
     texel = t[..., 0] * len(RAMP) - 0.5
     code = np.stack([np.interp(texel, np.arange(len(RAMP)), part) for part in RAMP.T], axis=-1)
+    code = evened(code)
     mapped = to_linear(np.array(BASE) / 255) * 4 * 2 ** (10 * (code / 255 - 1))
     vertices = np.array(FACTOR) * (COLORS[0] + (COLORS[1] - COLORS[0]) * t) * WHITE["vertices"]
     plain = to_srgb(np.array(FACTOR)) * (0.7 + 0.3 * facing[..., None])

@@ -84,18 +84,23 @@ def bake_cell(
 ) -> tuple[tuple[CellLight, int], list[tuple[str, bytes]]]:
     """The light of a cell, with the bytes of its lightmap that are served, and the files of it as
     `encode_image` returns them; none without one."""
+    import numpy as np
+
+    from ptmtools.light.model import HUE, scale_hue
+
     cell, piece = task
     light = shared.baking.light(piece)
     if light.texels is None:
         return (light, 0), []
-    name, data = lossy_codes(light.texels, QUALITY)
+    codes = scale_hue(light.texels, HUE).astype(np.float32)
+    name, data = lossy_codes(codes, QUALITY)
     files = encode_image(shared.options, f"{lightmap_stem(cell)}.{name}", data)
     return (light, sum(len(part) for file, part in files if file.startswith(f"{SERVED}/"))), files
 
 
 #: Quality of the images of lightmaps. (WebP 85 takes a quarter more bytes, and has blocks on smooth
 #: walls.)
-QUALITY = {"avif": 85, "webp": 90}
+QUALITY = {"avif": 80, "webp": 90}
 
 
 def lightmap_stem(cell: int) -> str:
@@ -340,7 +345,7 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 10
+    recipe = 11
     changed = "white is balanced; faces reflect as their part of an image does"
     options = LightOptions
     heeds = (TEXTURES,)

@@ -47,6 +47,7 @@ import { levelSizes } from "../../client/src/levels.js";
  *
  * @typedef {object} LightRow the curve and the surroundings of all light (docs/formats/hints.md)
  * @property {number} stops
+ * @property {number} [hue] the multiple of the hue of codes that lightmaps have
  * @property {"plain" | "neutral" | "agx"} tone
  * @property {number[]} [sky]
  * @property {number[]} [ground]
@@ -123,8 +124,8 @@ export class Site {
     if (!index.viewpoints.every(({ position, direction }) => [...position, ...direction].every(Number.isFinite))) {
       throw new Error("a view of no place");
     }
-    const { light: { stops = 1, sky = [], ground = [] } = {}, cells } = index;
-    const bright = [stops, ...sky, ...ground, ...cells.flatMap(({ exposure: [r, g, b] = [1, 1, 1] }) => [r, g, b])];
+    const { light: { stops = 1, hue = 1, sky = [], ground = [] } = {}, cells } = index;
+    const bright = [stops, hue - 1, ...sky, ...ground, ...cells.flatMap(({ exposure: [r, g, b] = [1, 1, 1] }) => [r, g, b])];
     if (!bright.every((number) => number >= 0 && number < Infinity)) throw new Error("light of no brightness");
     this.index = index;
     this.address = address;

@@ -10,6 +10,7 @@ import { BufferAttribute, BufferGeometry, Mesh, ShaderMaterial } from "three";
  * The light of a building.
  * @typedef {object} Light
  * @property {number} stops powers of two that the codes of lightmaps cover
+ * @property {number} [hue] the multiple of the hue of codes that lightmaps have
  * @property {string} tone "neutral", "agx" or "plain"
  * @property {number[]} [sky] radiance of the background, with "neutral"
  * @property {number[]} [ground]
@@ -171,7 +172,7 @@ export function glaze(material, { stops, tone }, exposure, mirrored) {
  * @param {Exposure} exposure
  * @param {Mirrored | null} [mirrored] what it reflects
  */
-export function illuminate(material, white, { stops, tone }, exposure, mirrored) {
+export function illuminate(material, white, { stops, hue = 1, tone }, exposure, mirrored) {
   const before = material.onBeforeCompile, key = material.customProgramCacheKey();
   material.toneMapped = false;
   material.onBeforeCompile = (shader) => {
@@ -180,7 +181,8 @@ export function illuminate(material, white, { stops, tone }, exposure, mirrored)
     if (mirrored) mirror(shader, mirrored);
     const shown = mirrored ? "reflected(diffuseColor.rgb, received * white)" : "gl_FragColor.rgb * white";
     const head = `uniform float white;\nuniform vec3 exposure;\n${developed(tone)}${mirrored ? reflections(stops) : ""}`;
-    const codes = "exp2(float(" + stops + ") * (lightMapTexel.rgb - 1.0))";
+    const even = `mix(vec3(dot(lightMapTexel.rgb, vec3(0.299, 0.587, 0.114))), lightMapTexel.rgb, 1.0 / float(${hue}))`;
+    const codes = `exp2(float(${stops}) * (${even} - 1.0))`;
     shader.fragmentShader = head + shader.fragmentShader
       .replace("#include <aomap_fragment>", `
 vec3 received = vec3(1.0);
@@ -191,7 +193,7 @@ reflectedLight.indirectDiffuse = received;
       .replace("#include <opaque_fragment>", `$&
 gl_FragColor.rgb = developed(${shown} * exposure);`);
   };
-  material.customProgramCacheKey = () => `${key} light ${stops} ${tone} ${Boolean(mirrored)}`;
+  material.customProgramCacheKey = () => `${key} light ${stops} ${hue} ${tone} ${Boolean(mirrored)}`;
 }
 
 /**
