@@ -122,7 +122,7 @@ def light_of(geometry: Geometry, scene: Scene, *, reflects: bool = True) -> Ligh
     return Light(
         np.zeros(rooms, np.int32),
         np.ones(rooms),
-        np.ones(rooms),
+        np.ones((rooms, 3)),
         np.ones(shapes, np.bool_),
         np.zeros(shapes, np.bool_),
         np.zeros((faces, 3, 2), np.float32),
