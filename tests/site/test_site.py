@@ -33,7 +33,7 @@ from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_
 
 PLAIN = SiteOptions(pictures=False)
 #: Bytes of the page itself, compressed.
-LARGEST_PAGE = 56_500
+LARGEST_PAGE = 56_400
 
 
 @pytest.fixture(scope="module")

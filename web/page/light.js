@@ -128,7 +128,7 @@ ${reflects ? REFLECTIONS : ""}
 vec3 display(vec3 texel) {
   if (white == 0.0) return texel * color.rgb * painted;
   vec3 share = code.r < 0.0 ? texture(lightmap, spot).rgb : code;
-  share = mix(vec3(dot(share, vec3(0.299, 0.587, 0.114))), share, 1.0 / float(${hue}));
+  share = mix(vec3(dot(share, vec3(0.299, 0.587, 0.114))), share, 1.0 / float(${Math.max(1, hue) || 1}));
 ${reflects ? `  return developed(exposure * reflected(linear(texel) * color.rgb * painted, white * exp2(stops * (share - 1.0))));`
     : `  return developed(linear(texel) * color.rgb * painted * white * exposure * exp2(stops * (share - 1.0)));`}
 }

@@ -115,7 +115,7 @@ export class Site {
    */
   constructor(index, address) {
     if (index.schema !== SCHEMA) {
-      throw new Error(`the index has schema ${index.schema}, and this page reads ${SCHEMA}`);
+      throw new Error(`the index has schema ${index.schema}, not ${SCHEMA}`);
     }
     for (const { differences, previews = [] } of index.textures) {
       // The tables of levels would not end.
@@ -124,9 +124,9 @@ export class Site {
     if (!index.viewpoints.every(({ position, direction }) => [...position, ...direction].every(Number.isFinite))) {
       throw new Error("a view of no place");
     }
-    const { light: { stops = 1, hue = 1, sky = [], ground = [] } = {}, cells } = index;
-    const bright = [stops, hue - 1, ...sky, ...ground, ...cells.flatMap(({ exposure: [r, g, b] = [1, 1, 1] }) => [r, g, b])];
-    if (!bright.every((number) => number >= 0 && number < Infinity)) throw new Error("light of no brightness");
+    const { light: { stops = 1, sky = [], ground = [] } = {}, cells } = index;
+    const bright = [stops, ...sky, ...ground, ...cells.flatMap(({ exposure: [r, g, b] = [1, 1, 1] }) => [r, g, b])];
+    if (!bright.every((number) => number >= 0 && number < Infinity)) throw new Error("light of no level");
     this.index = index;
     this.address = address;
   }

@@ -12,12 +12,14 @@ export function contextOf(canvas, low) {
   return /** @type {WebGL2RenderingContext | null} */ (gl);
 }
 
+/** UNMASKED_RENDERER_WEBGL. */
+const UNMASKED_RENDERER = 0x9246;
+
 /**
  * Whether a graphics card draws, for a visitor who wants all of its quality.
  * @param {WebGL2RenderingContext} gl
  */
 export function isCard(gl) {
-  const names = gl.getExtension("WEBGL_debug_renderer_info");
-  const name = gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
-  return gl.getContextAttributes()?.antialias && !/swiftshader|llvmpipe|basic render/i.test(name);
+  return gl.getContextAttributes()?.antialias && gl.getExtension("WEBGL_debug_renderer_info")
+    && !/Swift|llvm|Basic/.test(gl.getParameter(UNMASKED_RENDERER));
 }

@@ -11,6 +11,8 @@ export const STRIPE = 256 << 10;
 const FADE = 0.3;
 /** Texels along the line of sight that a graphics card averages where a surface is seen from the side. */
 const ANISOTROPY = 4;
+/** TEXTURE_MAX_ANISOTROPY_EXT. */
+const MAX_ANISOTROPY = 0x84fe;
 
 /**
  * Formats by channels on the GPU, which has no texels of three bytes.
@@ -96,8 +98,9 @@ export class Storage {
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, s);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, t);
       this.#wrap = wrap;
-      const anisotropic = !atlas && isCard(gl) && gl.getExtension("EXT_texture_filter_anisotropic");
-      if (anisotropic) gl.texParameterf(gl.TEXTURE_2D, anisotropic.TEXTURE_MAX_ANISOTROPY_EXT, ANISOTROPY);
+      if (!atlas && isCard(gl) && gl.getExtension("EXT_texture_filter_anisotropic")) {
+        gl.texParameterf(gl.TEXTURE_2D, MAX_ANISOTROPY, ANISOTROPY);
+      }
     }
     if (!this.#fading) return false;
     const left = this.#fading * Math.max(0, 1 - (now - this.#since) / FADE);
