@@ -71,6 +71,8 @@ def test_a_site_is_published_again(
     release: Path, ptm: Ptm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(release)
+    build = ("-q", "build-scene", "model/two_rooms.obj", "-j", "1", "-o", "rooms.db")
+    assert main([*build]) == 0
     assert main(["-q", "publish", "rooms.db", "-o", "site"]) == 0
     assert main(["-q", "publish", "rooms.db", "-o", "fresh"]) == 0
     assert files_below(release / "site") == files_below(release / "fresh"), "nothing is left over"
