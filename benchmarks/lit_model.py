@@ -24,7 +24,7 @@ from ptmtools_samples.lit_hall import corner_normals
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.glb import glb_chunks
-from ptmtools.light.building import BLUE, CEILING, GROUND, SKY, WARM
+from ptmtools.light.building import BLUE, CEILING, CLOUDY, GROUND, SKY, WARM
 from ptmtools.light.occlusion import Occluders
 from ptmtools.scene import Scene, ingest
 from ptmtools.scene.colors import to_linear
@@ -93,7 +93,7 @@ class LitModel:
         self.lamps = path_lamps(tree, self.scene)
         self.normal = corner_normals(self.scene.corners)
         suns = [lamp for lamp in self.lamps if lamp.kind == "directional"]
-        self.sky = (suns[0].color.mean() / 5 if suns else SKY) * BLUE
+        self.sky = suns[0].color.mean() / 5 * BLUE if suns else SKY * CLOUDY
         self._images: dict[int, NDArray[np.float32]] = {}
 
     @cached_property

@@ -39,8 +39,9 @@ if TYPE_CHECKING:
     from ptmtools.scene.lights import Lights
     from ptmtools.scene.model import Scene
 
-#: Luminance and colour of a cloudy sky, and of its part that a sun's illuminance is.
-SKY, BLUE, OF_SUN = 1000.0, np.array([0.89, 1.0, 1.22]), 0.2
+#: Luminance and colour of a cloudy sky; colour of a clear one, and its share of the sun's lux.
+SKY, CLOUDY = 1000.0, np.array([0.98, 1.0, 1.05])
+BLUE, OF_SUN = np.array([0.89, 1.0, 1.22]), 0.2
 #: Reflectance of the ground.
 GROUND = 0.3
 #: Radiance of ceilings that glow, as a share of `SKY`, and its colour.
@@ -185,8 +186,7 @@ class BuildingBaking:
         sun = [lamp for lamp in (self._lights.lamps if self._lights else ()) if lamp.kind == "sun"]
         lux = sum((k.intensity * np.array(k.color) * max(-k.direction[1], 0.0) for k in sun),
                   start=np.zeros(3))  # fmt: skip
-        level = max((lamp.intensity for lamp in sun), default=SKY / OF_SUN) * OF_SUN
-        sky = level * BLUE
+        sky = max(lamp.intensity for lamp in sun) * OF_SUN * BLUE if sun else SKY * CLOUDY
         daylight = Daylight(sky, GROUND * (sky + lux / math.pi))
         lamps = lamps_of(self._scene, self._lights)
         self._shine = np.zeros((len(self._scene.materials), 3))

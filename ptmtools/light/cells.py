@@ -53,6 +53,9 @@ _LEAST = 0.01
 #: The share of a cell's light that its white is not less than, and how much more it is, so that
 #: codes of bright light have room for their hue.
 _WHITE, _ROOM = 0.995, 1.9
+#: What shows as this many times white shows as no more: the spot beside a lamp would take the codes
+#: of the room.
+_GLARE = 16.0
 #: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
 #: and the share of the surfaces that is no brighter than the other number, so that white walls keep
 #: their texture.
@@ -148,9 +151,9 @@ class LightBaking:
             area = areas(corner[rows]).sum() / max(len(light), 1)
             weights.append(np.where(np.isnan(light[:, 0]), 0.0, area))
         sample, weight = np.concatenate(samples), np.concatenate(weights)
-        white = self._white(sample, weight)
         reflectance = self.reflectance[np.concatenate(faces)]
         shown = _exposure(sample.astype(np.float64), reflectance, weight)
+        white = self._white(sample, weight, shown[0])
         shares = encode_srgb(vertex.astype(np.float64) / white)
         return CellLight(
             mapped,
@@ -236,12 +239,13 @@ class LightBaking:
         samples = math.ceil(rays * self.options.light_samples)
         return self.building.look(corner[rows], side[rows], samples, 0.0)
 
-    def _white(self, light: Singles, weight: Floats) -> float:
-        """The white of a cell with this (n, 3) light."""
+    def _white(self, light: Singles, weight: Floats, exposure: float) -> float:
+        """The white of a cell with this (n, 3) light and logarithm of its exposure."""
         if self.building is None:
             return 1.0
         bright = light[weight > 0].max(axis=1, initial=0.0)
         white = _ROOM * float(np.quantile(bright, _WHITE)) if len(bright) else 0.0
+        white = min(white, _GLARE / math.exp(exposure))
         # Three digits, as in GLBs.
         return float(f"{white:.3g}") if white > 0 else self.building.usual
 
@@ -267,8 +271,11 @@ def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[floa
     mean = float((weight[order] * np.log(radiance[order])).sum()) / float(total[-1])
     high = radiance[order[np.searchsorted(total, _HIGH * total[-1])]]
     exposure = min(math.log(_KEY) - mean, math.log(_MOST_OF_WHITE / high))
-    hue = np.log(np.maximum(light[shows] / bright[shows, None], _LEAST_HUE))
-    tint = (weight[shows, None] * hue).sum(axis=0) / total[-1]
+    # Eyes get used to what is bright, but not to what glares, as a wall beside a lamp.
+    seen = weight[order] * np.minimum(1.0, high / radiance[order])
+    mean_light = (seen[:, None] * reflectance[order, None] * light[order]).sum(axis=0)
+    hue = np.maximum(mean_light / luminance(mean_light), _LEAST_HUE)
+    tint = np.log(hue)
     balanced = (1 - _ADAPTATION) * tint
     # A white surface keeps its luminance.
     kept = np.log(luminance(np.exp(tint)) / luminance(np.exp(balanced)))

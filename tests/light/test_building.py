@@ -11,8 +11,16 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.light.building import BuildingBaking, BuildingLight
 from ptmtools.light.cells import LightBaking
-from ptmtools.light.model import STOPS, CellSurfaces, coded_light, light_codes
+from ptmtools.light.model import (
+    HUE,
+    STOPS,
+    CellSurfaces,
+    coded_light,
+    light_codes,
+    scale_hue,
+)
 from ptmtools.light.occlusion import normals, turns
+from ptmtools.scene.colors import luminance
 from ptmtools.scene.lights import Lamp, Lights
 from ptmtools.scene.model import Scene
 from tests.light.shapes import quad
@@ -199,11 +207,29 @@ def test_white_is_balanced(walls: tuple[float, float, float]) -> None:
     result = LightBaking(OPTIONS, building, None, grey).light(piece(corner))
     assert result.texels is not None
     light = coded_light(result.texels, result.white).reshape(-1, 3)
-    before = np.diff(np.log(light).mean(axis=0))
+    bright = luminance(light)[:, None]
+    seen = light * np.minimum(1.0, np.quantile(bright, 0.9) / bright)
+    before = np.diff(np.log(seen.mean(axis=0)))
     after = before + np.diff(result.balance)
     np.testing.assert_allclose(after, 0.3 * before, atol=0.03)
     strength = np.abs(before).max()
     assert strength < 0.1 if len(set(walls)) == 1 else strength > 0.3
+
+
+def test_glare_leaves_the_room_its_codes() -> None:
+    """Images have three times the hue of codes: those of a dark room would be cut off beside the
+    bright spot on a wall."""
+    corner, albedo = room(), 0.15
+    cone = math.cos(0.3), math.cos(0.32)
+    lamp = Lamp("spot", (3, 1.5, 3), (1, 0, 0), intensity=9, cone=cone, color=(1, 1, 0.4))
+    building = lit(corner, with_lamps(lamp), albedo)
+    grey = np.full(len(corner), albedo, np.float32)
+    result = LightBaking(OPTIONS, building, None, grey).light(piece(corner))
+    assert result.texels is not None
+    light = math.exp(result.exposure) * coded_light(result.texels, result.white)
+    shown = albedo * light.max(axis=2) < 1
+    assert 0.9 < shown.mean() < 0.995
+    assert np.quantile(scale_hue(result.texels[shown], HUE), 0.01) > 0
 
 
 def test_a_pane_is_no_surface_of_the_light() -> None:

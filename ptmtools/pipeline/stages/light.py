@@ -345,8 +345,8 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 11
-    changed = "white is balanced; faces reflect as their part of an image does"
+    recipe = 12
+    changed = "white is balanced for bright light; a cloudy sky is white; glare takes no codes"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
