@@ -56,10 +56,12 @@ _WHITE, _ROOM = 0.995, 1.9
 #: What shows as this many times white shows as no more: the spot beside a lamp would take the codes
 #: of the room.
 _GLARE = 16.0
-#: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does;
-#: and the share of the surfaces that is no brighter than the other number, so that white walls keep
-#: their texture.
-_KEY, _HIGH, _MOST_OF_WHITE = 0.3, 0.9, 0.65
+#: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does,
+#: and a white surface in the usual light as the other number, so that white rooms are not grey.
+_KEY, _KEY_OF_WHITE = 0.3, 0.7
+#: The share of the surfaces that is no brighter than the other number: white walls keep their
+#: texture.
+_HIGH, _MOST_OF_WHITE = 0.9, 0.65
 #: Eyes get used to this share of a hue, as photographers balance white, a logarithm; and components
 #: of light count as at least this share of its luminance.
 _ADAPTATION, _LEAST_HUE = 0.7, 0.1
@@ -268,9 +270,13 @@ def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[floa
     order = shows[np.argsort(radiance[shows], kind="stable")]
     total = np.cumsum(weight[order])
     # No dot product: its rounding follows the number of threads.
-    mean = float((weight[order] * np.log(radiance[order])).sum()) / float(total[-1])
+    reflected, sent = (
+        float((weight[order] * np.log(values[order])).sum()) / float(total[-1])
+        for values in (radiance, bright)
+    )
     high = radiance[order[np.searchsorted(total, _HIGH * total[-1])]]
-    exposure = min(math.log(_KEY) - mean, math.log(_MOST_OF_WHITE / high))
+    wished = max(math.log(_KEY) - reflected, math.log(_KEY_OF_WHITE) - sent)
+    exposure = min(wished, math.log(_MOST_OF_WHITE / high))
     # Eyes get used to what is bright, but not to what glares, as a wall beside a lamp.
     seen = weight[order] * np.minimum(1.0, high / radiance[order])
     mean_light = (seen[:, None] * reflectance[order, None] * light[order]).sum(axis=0)

@@ -216,6 +216,20 @@ def test_white_is_balanced(walls: tuple[float, float, float]) -> None:
     assert strength < 0.1 if len(set(walls)) == 1 else strength > 0.3
 
 
+@pytest.mark.parametrize(("reflectance", "shown"), [(0.1, 0.3), (0.4, 0.3), (0.8, 0.56)])
+def test_white_rooms_are_not_grey(reflectance: float, shown: float) -> None:
+    """What surfaces show on average: 0.3 as in a photograph, but more in a white room."""
+    corner = room()
+    building = lit(corner, None, reflectance)
+    grey = np.full(len(corner), reflectance, np.float32)
+    result = LightBaking(OPTIONS, building, None, grey).light(piece(corner))
+    assert result.texels is not None
+    light = coded_light(result.texels, result.white).reshape(-1, 3)
+    radiance = reflectance * math.exp(result.exposure) * luminance(light)
+    assert np.exp(np.log(radiance).mean()) == pytest.approx(shown, rel=0.15)
+    assert np.quantile(radiance, 0.9) < 0.7
+
+
 def test_glare_leaves_the_room_its_codes() -> None:
     """Images have three times the hue of codes: those of a dark room would be cut off beside the
     bright spot on a wall."""
