@@ -7,10 +7,11 @@ read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -55,18 +56,23 @@ class NamedImage:
     package: str = ""
 
 
+#: The fields of a `SourceMaterial` that a message names images of, and these images by field and
+#: number of the material.
+ROLES = ("texture", "glow_map")
+Images: TypeAlias = Mapping[str, Mapping[int, NamedImage]]
+
+
 def pack_source(
     source: ModelSource,
-    images: dict[int, NamedImage],
+    images: Images,
     notes: IngestNotes,
     scratch: str,
     files: Iterable[str] = (),
 ) -> dict[str, Any]:
     """The message to `read_in_sandbox`; writes the arrays into the folder ``scratch``.
 
-    The materials of ``source`` have no textures and no normal maps; ``images`` are their images by
-    number of material.
-    ``files`` names the other files that the model consists of, missing ones included.
+    The materials of ``source`` have neither images nor normal maps. ``files`` names the other files
+    that the model consists of, missing ones included.
     """
     arrays = {name: getattr(source, name) for name in FACE_ARRAYS}
     if source.colors is not None:
@@ -78,7 +84,10 @@ def pack_source(
             {name: value for name, value in vars(material).items() if name != "normal"}
             for material in source.materials
         ],
-        "images": {str(number): vars(image) for number, image in images.items()},
+        "images": {
+            name: {str(number): vars(image) for number, image in numbered.items()}
+            for name, numbered in images.items()
+        },
         "cameras": [vars(camera) for camera in source.cameras],
         "kinds": source.kinds,
         "storeys": [vars(storey) for storey in source.storeys],
@@ -120,9 +129,11 @@ def read_in_sandbox(
         for name in message["files"]:
             notes.folder.find(name)
         materials = [SourceMaterial(**fields_of(row)) for row in message["materials"]]
-        for number, row in message["images"].items():
-            texture = _texture(NamedImage(**row), model, notes)
-            materials[int(number)] = replace(materials[int(number)], texture=texture)
+        for name, images in message["images"].items():
+            with nullcontext() if name == "texture" else notes.optional():
+                for number, row in images.items():
+                    use: dict[str, Any] = {name: _texture(NamedImage(**row), model, notes)}
+                    materials[int(number)] = replace(materials[int(number)], **use)
         objects = tuple(message["objects"])
         return ModelSource(
             points=points,

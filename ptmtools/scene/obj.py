@@ -30,6 +30,7 @@ from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.options import MAX_VERTICES, IngestOptions, too_many_triangles
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
+    DARK,
     FileRange,
     ModelSource,
     NormalTexture,
@@ -50,8 +51,9 @@ def library_names(text: str) -> list[str]:
 def resolve_materials(
     path: Path, statements: _Statements, notes: IngestNotes, *, normals: bool
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
-    """The materials of an OBJ file, with normal maps if ``normals``, and the map_Kd statements by
-    number of material. Only images of materials with faces are looked up.
+    """The materials of an OBJ file, with normal maps if ``normals``, and the statements of their
+    colours, or of the emission that stands for them, by number of material. Only images of
+    materials with faces are looked up.
 
     Raises the errors of `read_mtl`.
     """
@@ -71,8 +73,13 @@ def resolve_materials(
             texture = _texture(material, "map_Kd", material.map_kd, notes)
             mask = _texture(material, "map_d", material.map_d, notes)
             normal = _normal(material, texture, notes) if normals else None
-        if texture is not None and material.map_kd is not None:
-            maps[index] = material.map_kd
+        glow = _glow(material, notes, index in used)
+        shown = material.map_kd
+        if texture is None:
+            dark = max(material.color or (1.0,)) <= DARK
+            shown = material.map_ke if dark and glow.get("glow_map") else None
+        if shown is not None:
+            maps[index] = shown
         materials.append(
             SourceMaterial(
                 name=name,
@@ -84,7 +91,7 @@ def resolve_materials(
                 mask=mask,
                 shine=_shine(material),
                 normal=normal,
-                **_glow(material, notes, index in used),
+                **glow,
                 **_matter(material, notes, index in used),
             )
         )
@@ -154,7 +161,8 @@ def _optional_texture(
         return None
     what = f"{key} {statement.file}"
     place = f"{notes.folder.label(material.library)}:{statement.line}"
-    return SourceTexture(FileRange(file), file.name, what, place, channel=statement.channel)
+    wrap: Wrap = "clamp" if statement.clamp else "repeat"
+    return SourceTexture(FileRange(file), file.name, what, place, wrap, wrap, statement.channel)
 
 
 def _matter(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
@@ -197,15 +205,7 @@ def _texture(
         elif colors is None or transform != (colors.scale, colors.offset):
             notes.note("PTM-N215", f"{what}: ignored -s -o", place)
     wrap: Wrap = "clamp" if statement.clamp else "repeat"
-    return SourceTexture(
-        read=FileRange(file),
-        label=file.name,
-        what=what,
-        place=place,
-        wrap_s=wrap,
-        wrap_t=wrap,
-        channel=statement.channel,
-    )
+    return SourceTexture(FileRange(file), file.name, what, place, wrap, wrap, statement.channel)
 
 
 #: Statements without effect on surfaces, skipped without a note.

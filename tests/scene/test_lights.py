@@ -320,6 +320,20 @@ def test_dark_materials_of_obj_show_their_emission(textured: Callable[..., Path]
         assert len(reduced(scene)) == -image
 
 
+def test_the_options_of_an_emission_of_obj_count_where_it_is_shown(
+    textured: Callable[..., Path],
+) -> None:
+    files = {"glow.png": png(HALF)}
+    options = IngestOptions(unit="m", up="y")
+    sizes, wraps = [], []
+    for mtl in ("Kd 0 0 0", "Kd 1 1 1"):
+        scene = ingest(textured(f"{mtl}\nmap_Ke -s 0.25 3 1 -clamp on glow.png", files), options)
+        sizes.append(np.ptp(scene.uv, axis=(0, 1)))
+        wraps.append((scene.materials[0].wrap_s, scene.materials[0].wrap_t))
+    assert sizes[0] == pytest.approx(sizes[1] * [0.25, 3])
+    assert wraps == [("clamp", "clamp"), ("repeat", "repeat")]
+
+
 def test_a_texture_that_also_glows_is_not_plain(textured: Callable[..., Path]) -> None:
     """The model is read again when it is repainted."""
     white = {"glow.png": png(np.full((4, 4, 3), 255, np.uint8))}

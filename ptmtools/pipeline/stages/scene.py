@@ -222,8 +222,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 14
-    changed = "lamps of IFC files have their power, and images of emission are shown"
+    recipe = 15
+    changed = "images of emission of USD light and are shown"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

@@ -21,15 +21,16 @@ from pxr import Ar, Sdf, Usd, UsdGeom, UsdShade
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.scene.colors import encode_srgb, to_srgb
-from ptmtools.scene.messages import NamedImage
+from ptmtools.scene.messages import ROLES, Images, NamedImage
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.source import SourceMaterial, SourceWrap
+from ptmtools.scene.source import DARK, SourceMaterial, SourceWrap
 from ptmtools.scene.usd.layers import TIME
 from ptmtools.scene.usd.mesh import UsdMesh, array, at_corners
 
 #: Defaults of UsdPreviewSurface (its specification, "Core Nodes").
 _DIFFUSE, _ROUGHNESS = (0.18, 0.18, 0.18), 0.5
 _ONES, _ZEROS, _WHITE = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+_IMAGE = "UsdUVTexture"
 #: The reader of packages, which older releases have in another module.
 _ARCHIVES = Sdf.ZipFile if hasattr(Sdf, "ZipFile") else Usd.ZipFile
 _WRAPS: dict[str, SourceWrap] = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
@@ -47,9 +48,11 @@ class UsdSurface:
     ----------
     material: its colour is white with an image, None without a supported colour.
     image: the image of its colour.
-    coords: the primvar with the image's coordinates, "" without one.
+    coords: the primvar with the coordinates of the image, or of the image of emission if that may
+        be shown; "" without one.
     matrix: (2, 3) transformation of the coordinates.
     colors: the primvar with the colours, "" without one.
+    glow_map: the image of its emission.
     """
 
     material: SourceMaterial
@@ -57,19 +60,13 @@ class UsdSurface:
     coords: str = ""
     matrix: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     colors: str = ""
+    glow_map: NamedImage | None = None
 
 
 def tint(linear: Any) -> Color:
     """A colour of three numbers in sRGB."""
     r, g, b = to_srgb(np.array(linear, dtype=np.float64)).tolist()
     return r, g, b
-
-
-def _glow(shader: Any) -> Color:
-    """The linear radiance that a shader emits; images have no effect."""
-    emitted = _numbers(_resolve(shader.GetInput("emissiveColor"))[0], _ZEROS[:3])
-    red, green, blue = (max(0.0, part) for part in emitted)
-    return red, green, blue
 
 
 def _matter(shader: Any, name: str, place: str, notes: IngestNotes) -> dict[str, Any]:
@@ -104,26 +101,31 @@ class UsdMaterialReader:
     def _read(self, material: Any) -> UsdSurface:
         name, place = material.GetPrim().GetName(), str(material.GetPath())
         shader, *_ = material.ComputeSurfaceSource()
-        if not shader or shader.GetIdAttr().Get(TIME) != "UsdPreviewSurface":
+        if not shader or _kind(shader) != "UsdPreviewSurface":
             self._notes.miss("PTM-N214", f"{name}: no UsdPreviewSurface, ignored", place)
             return UsdSurface(SourceMaterial(name))
         opacity, varies, from_image = self._opacity(shader, name, place)
         see_through = varies or from_image is not None
         matter = _matter(shader, name, place, self._notes)
-        plain = SourceMaterial(
-            name, opacity=opacity, see_through=see_through, glow=_glow(shader), **matter
-        )
+        glow, glow_map, emitter = self._glow(shader, name, place)
+        plain = SourceMaterial(name, opacity=opacity, see_through=see_through, glow=glow, **matter)
+        surface = UsdSurface(plain, glow_map=glow_map)
         value, source, output = _resolve(shader.GetInput("diffuseColor"))
         if source is None:
             self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
-            return UsdSurface(replace(plain, color=tint(_numbers(value, _DIFFUSE))))
-        kind = str(source.GetIdAttr().Get(TIME))
+            color = tint(_numbers(value, _DIFFUSE))
+            surface = replace(surface, material=replace(plain, color=color))
+            if glow_map is None or max(color) > DARK:
+                return surface
+            coords, matrix = self._coords(emitter, name, place)
+            return replace(surface, coords=coords, matrix=matrix)
+        kind = _kind(source)
         if kind.startswith("UsdPrimvarReader_float"):
             colors = str(_resolve(source.GetInput("varname"))[0] or "")
-            return UsdSurface(replace(plain, color=_WHITE), colors=colors)
-        if kind != "UsdUVTexture":
+            return replace(surface, material=replace(plain, color=_WHITE), colors=colors)
+        if kind != _IMAGE:
             self._notes.miss("PTM-N214", f"{name}: colours of {kind} ignored", place)
-            return UsdSurface(plain)
+            return surface
         file = _resolve(source.GetInput("file"))[0]
         own_alpha = from_image == (_path_of(file), "a")
         if own_alpha:
@@ -135,10 +137,26 @@ class UsdMaterialReader:
             self._notes.note("PTM-N215", f"{name}: colour output {output} ignored", place)
         image = self._image(source, file, name, place)
         if image is None:
-            return UsdSurface(plain)
+            return replace(surface, material=plain)
         cutoff = _threshold(shader) if own_alpha else 0.0
         material = replace(plain, color=_WHITE, ignores_alpha=not own_alpha, cutoff=cutoff or None)
-        return UsdSurface(material, image, *self._coords(source, name, place))
+        return UsdSurface(material, image, *self._coords(source, name, place), glow_map=glow_map)
+
+    def _glow(self, shader: Any, name: str, place: str) -> tuple[Color, NamedImage | None, Any]:
+        """The linear radiance that a shader emits, a factor of an image if there is one, and the
+        shader of that."""
+        value, source, _ = _resolve(shader.GetInput("emissiveColor"))
+        image = None
+        if source is not None and _kind(source) == _IMAGE:
+            with self._notes.optional():
+                file = _resolve(source.GetInput("file"))[0]
+                image = self._image(source, file, name, place, scaled=True)
+            if image is not None:
+                value = _numbers(_resolve(source.GetInput("scale"))[0], _ONES)[:3]
+        elif source is not None:
+            self._notes.note("PTM-N215", f"{name}: emission of {_kind(source)} ignored", place)
+        red, green, blue = (max(0.0, part) for part in _numbers(value, _ZEROS[:3]))
+        return (red, green, blue), image, source
 
     def _opacity(self, shader: Any, name: str, place: str) -> tuple[float, bool, Any]:
         """The opacity; whether it varies or is tested, other than by the colour's image; and the
@@ -150,13 +168,16 @@ class UsdMaterialReader:
             if threshold > 0:  # alpha testing
                 opacity = float(opacity >= threshold)
             return opacity, False, None
-        if source.GetIdAttr().Get(TIME) == "UsdUVTexture":
+        if _kind(source) == _IMAGE:
             return 1.0, threshold > 0, (_path_of(_resolve(source.GetInput("file"))[0]), output)
         message = f"{name}: opacity ignored, the material is transparent"
         self._notes.note("PTM-N215", message, place)
         return 1.0, True, None
 
-    def _image(self, texture: Any, file: Any, name: str, place: str) -> NamedImage | None:
+    def _image(
+        self, texture: Any, file: Any, name: str, place: str, *, scaled: bool = False
+    ) -> NamedImage | None:
+        """The image of a texture; ``scaled``: whether the caller applies its scale."""
         path = _path_of(file)
         if not path:
             self._notes.miss("PTM-N204", f"{name}: texture without an image", place)
@@ -164,10 +185,11 @@ class UsdMaterialReader:
         if "<UDIM>" in path:
             self._notes.miss("PTM-N214", f"{path}: UDIM tiles ignored", place)
             return None
-        scale = _numbers(_resolve(texture.GetInput("scale"))[0], _ONES)
+        scale = _ONES if scaled else _numbers(_resolve(texture.GetInput("scale"))[0], _ONES)
         bias = _numbers(_resolve(texture.GetInput("bias"))[0], _ZEROS)
         if scale != _ONES or bias != _ZEROS:
-            self._notes.note("PTM-N215", f"{path}: scale and bias ignored", place)
+            what = "bias" if scaled else "scale and bias"
+            self._notes.note("PTM-N215", f"{path}: {what} ignored", place)
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
         return self._named_image(file, place, wrap_s, wrap_t)
 
@@ -215,16 +237,21 @@ class UsdMaterialReader:
         matrix, transformed = np.eye(3), False
         source = _resolve(texture.GetInput("st"))[1]
         for _ in range(_DEEPEST):
-            if source is None or source.GetIdAttr().Get(TIME) != "UsdTransform2d":
+            if source is None or _kind(source) != "UsdTransform2d":
                 break
             matrix, transformed = matrix @ _transform(source), True
             source = _resolve(source.GetInput("in"))[1]
         if transformed:
             self._notes.note("PTM-N215", f"{name}: UsdTransform2d baked into its faces", place)
         coords = ""
-        if source is not None and source.GetIdAttr().Get(TIME) == "UsdPrimvarReader_float2":
+        if source is not None and _kind(source) == "UsdPrimvarReader_float2":
             coords = str(_resolve(source.GetInput("varname"))[0] or "")
         return coords, tuple((a, b, c) for a, b, c in matrix[:2].tolist())
+
+
+def _kind(shader: Any) -> str:
+    """The type of a node."""
+    return str(shader.GetIdAttr().Get(TIME))
 
 
 def _threshold(shader: Any) -> float:
@@ -280,17 +307,21 @@ class UsdPainter:
     def __init__(self, reader: UsdMaterialReader, notes: IngestNotes) -> None:
         self._reader = reader
         self._notes = notes
-        self._number: dict[tuple[SourceMaterial, NamedImage | None], int] = {}
+        self._number: dict[tuple[SourceMaterial, NamedImage | None, NamedImage | None], int] = {}
         self._coords: dict[tuple[Any, ...], Floats] = {}
         self._colors: dict[tuple[Any, ...], tuple[Color | None, NDArray[np.uint8] | None]] = {}
 
     @property
     def materials(self) -> tuple[SourceMaterial, ...]:
-        return tuple(material for material, _ in self._number)
+        return tuple(material for material, *_ in self._number)
 
     @property
-    def images(self) -> dict[int, NamedImage]:
-        return {number: image for (_, image), number in self._number.items() if image is not None}
+    def images(self) -> Images:
+        numbers = self._number.items()
+        return {
+            name: {n: image for (_, *images), n in numbers if (image := images[k]) is not None}
+            for k, name in enumerate(ROLES)
+        }
 
     def paint(
         self, prim: Any, shape: UsdMesh, key: Any
@@ -307,10 +338,11 @@ class UsdPainter:
             faces = index == number
             if not faces.any():
                 continue
-            entry, image, corners = self._material(prim, shape, key, surface, two_sided)
-            material[faces] = self._number.setdefault((entry, image), len(self._number))
-            if image is not None:
-                assert surface is not None
+            surface = surface or UsdSurface(SourceMaterial("default"))
+            entry, corners = self._material(prim, shape, key, surface, two_sided)
+            use = entry, surface.image, surface.glow_map
+            material[faces] = self._number.setdefault(use, len(self._number))
+            if surface.image is not None or surface.coords:
                 uv[faces] = self._coordinates(prim, shape, key, surface)[faces]
             if corners is not None:
                 if colors is None:
@@ -338,10 +370,9 @@ class UsdPainter:
         return surfaces, face_surface
 
     def _material(
-        self, prim: Any, shape: UsdMesh, key: Any, surface: UsdSurface | None, two_sided: bool
-    ) -> tuple[SourceMaterial, NamedImage | None, NDArray[np.uint8] | None]:
+        self, prim: Any, shape: UsdMesh, key: Any, surface: UsdSurface, two_sided: bool
+    ) -> tuple[SourceMaterial, NDArray[np.uint8] | None]:
         """The material of a surface on this mesh, and the colours of its corners."""
-        surface = surface or UsdSurface(SourceMaterial("default"))
         material, corners = replace(surface.material, two_sided=two_sided), None
         if surface.colors or (material.color is None and surface.image is None):
             color, corners = self._display(prim, shape, key, surface.colors or "displayColor")
@@ -353,7 +384,7 @@ class UsdPainter:
                     opacity=material.opacity * displayed,
                     see_through=material.see_through or varies,
                 )
-        return material, surface.image, corners
+        return material, corners
 
     def _display(
         self, prim: Any, shape: UsdMesh, key: Any, name: str

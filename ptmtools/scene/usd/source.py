@@ -19,7 +19,7 @@ from pxr import Tf, Usd, UsdGeom
 
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
-from ptmtools.scene.messages import NamedImage
+from ptmtools.scene.messages import Images
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.options import too_many_triangles
@@ -217,7 +217,7 @@ def _surfaces(prim: Any, predicate: Any) -> int:
 
 def make_source(
     path: Path, notes: IngestNotes, limit: int
-) -> tuple[ModelSource, dict[int, NamedImage], list[str]]:
+) -> tuple[ModelSource, Images, list[str]]:
     """The model without textures; the images of its materials by number; and the names of its
     files. Raises the errors of `ptmtools.scene.usd.reader.read_usd`.
     """
@@ -227,9 +227,7 @@ def make_source(
         raise unreadable(LIBRARY, path, reason(error)) from None
 
 
-def _make(
-    path: Path, notes: IngestNotes, limit: int
-) -> tuple[ModelSource, dict[int, NamedImage], list[str]]:
+def _make(path: Path, notes: IngestNotes, limit: int) -> tuple[ModelSource, Images, list[str]]:
     stage, files = open_stage(path, notes)
     traversal = Traversal(stage, notes, path)
     group = traversal.group()

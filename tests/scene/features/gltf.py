@@ -24,6 +24,7 @@ from tests.scene.features.registry import (
     feature,
     four,
     glossy,
+    glowing,
     half,
     mirrored,
     seen,
@@ -55,6 +56,15 @@ def with_texture(
 def _(put: Put) -> str:
     doc = GltfModel()
     doc.place(doc.quad(**with_texture(doc, png(FOUR))))
+    return glb(put, doc)
+
+
+@feature("glTF", "images of emission", "carried over", glowing, "PTM-N215")
+def _(put: Put) -> str:
+    doc = GltfModel()
+    shown = {"emissiveTexture": {"index": 0}, "emissiveFactor": [1, 1, 1]}
+    black = {"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}}
+    doc.place(doc.quad(**with_texture(doc, png(FOUR), **shown, **black)))
     return glb(put, doc)
 
 

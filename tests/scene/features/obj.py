@@ -14,6 +14,7 @@ from tests.scene.features.registry import (
     feature,
     four,
     glossy,
+    glowing,
     half,
     shown,
     the_quad,
@@ -35,6 +36,11 @@ def obj(put: Put, mtl: str = "", lines: str = FACE, head: str = "", **files: byt
 @feature("OBJ", "textures", "carried over", four)
 def _(put: Put) -> str:
     return obj(put, "map_Kd four.png", four_png=png(FOUR))
+
+
+@feature("OBJ", "images of emission", "carried over", glowing)
+def _(put: Put) -> str:
+    return obj(put, "Kd 0 0 0\nmap_Ke four.png", four_png=png(FOUR))
 
 
 @feature("OBJ", "material colours", "carried over", tinted)

@@ -120,6 +120,14 @@ def four(scene: Scene) -> None:
     assert quarters == [RED, GREEN, BLUE, WHITE]
 
 
+def glowing(scene: Scene) -> None:
+    """The image as it is, whatever the light."""
+    four(scene)
+    assert scene.lights is not None
+    assert scene.lights.unlit.tolist() == [True]
+    assert np.allclose(scene.lights.glow, 0.5)
+
+
 ALPHA = np.array([[0, 255], [255, 51]], np.uint8)
 
 

@@ -16,6 +16,7 @@ from tests.scene.features.registry import (
     feature,
     four,
     glossy,
+    glowing,
     half,
     mirrored,
     seen,
@@ -47,6 +48,15 @@ def written(put: Put, stage: Any, **images: np.ndarray) -> str:
 def _(put: Put) -> str:
     on = made().stage()
     made().textured(on, "four.png")
+    return written(put, on, four=FOUR)
+
+
+@feature("USD", "images of emission", "carried over", glowing, "PTM-N215")
+def _(put: Put) -> str:
+    on = made().stage()
+    image = made().rgb(made().texture(on, "/World/m/image", "four.png"))
+    black = made().material(on, "/World/m", diffuseColor=(0, 0, 0), emissiveColor=image)
+    made().bind(made().mesh(on, st=made().CORNERS), black)
     return written(put, on, four=FOUR)
 
 

@@ -23,7 +23,8 @@ class Read:
         path = folder / f"{len(os.listdir(folder))}.usda"
         stage.GetRootLayer().Export(str(path))
         findings = IngestNotes(path)
-        self.source, self.images, self.files = make_source(path, findings, most)
+        self.source, images, self.files = make_source(path, findings, most)
+        self.images, self.glow_maps = images["texture"], images["glow_map"]
         self.notes = findings.entries
         self.codes = {note.code for note in self.notes}
 

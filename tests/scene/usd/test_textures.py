@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ptmtools.scene import ingest
+from ptmtools.scene import IngestOptions, ingest
 from tests.scene.conftest import Put, noise, png
 
 if find_spec("pxr") is not None:
@@ -194,6 +194,74 @@ def test_values_of_another_type_say_nothing(read: Any, name: str, kind: str) -> 
     (material,) = read(on).source.materials
     assert material.color == pytest.approx((0.461356,) * 3, abs=1e-6)
     assert material.opacity == 1
+
+
+HALF = np.repeat([[255] * 4 + [0] * 4], 8, axis=0).astype(np.uint8)[..., None].repeat(3, axis=2)
+
+
+def screen(emitter: dict[str, Any], **surface: Any) -> Any:
+    """A wall that emits glow.png; ``emitter``: inputs of the texture."""
+    on = made.stage()
+    wall = made.mesh(on, st=made.CORNERS)
+    image = made.texture(on, "/World/paint/glow", emitter.pop("file", "glow.png"), **emitter)
+    inputs = {"emissiveColor": made.rgb(image), **surface}
+    made.bind(wall, made.material(on, "/World/paint", **inputs))
+    return on
+
+
+def test_a_dark_surface_shows_the_image_of_its_emission(put: Put) -> None:
+    put("glow.png", png(HALF))
+    on = screen({"wrapS": "clamp", "scale": (0.5, 2, 4, 1)}, diffuseColor=(0, 0, 0))
+    scene = ingest(put("screen.usda", on.GetRootLayer().ExportToString().encode()))
+    (material,) = scene.materials
+    assert (material.image, material.wrap_s, material.wrap_t) == (0, "clamp", "repeat")
+    assert material.color[0] == pytest.approx(0.735, abs=1e-3), "0.5 in sRGB"
+    assert scene.images[0].load() == png(HALF)
+    assert np.ptp(scene.uv, axis=(0, 1)) == pytest.approx(np.ptp(made.CORNERS, axis=0))
+    assert scene.lights.unlit.all()
+    assert scene.lights.glow == pytest.approx(np.array([[0.25, 1, 2]]))
+
+
+def test_other_emissions_of_images_light_by_their_mean(put: Put) -> None:
+    put("glow.png", png(HALF))
+    put("brick.png", png(noise(1)))
+    for number, (emitter, surface, glow) in enumerate(
+        (
+            ({}, {"diffuseColor": (0.2, 0, 0)}, 0.5),
+            ({"file": "gone.png"}, {"diffuseColor": (0, 0, 0)}, 1),
+            ({"file": "glow.<UDIM>.png"}, {}, 0),
+            ({"bias": (0.1, 0, 0, 0)}, {}, 0.5),
+        )
+    ):
+        on = screen(emitter, **surface)
+        model = put(f"{number}.usda", on.GetRootLayer().ExportToString().encode())
+        scene = ingest(model, IngestOptions(strict=True))
+        assert scene.materials[0].image == -1, number
+        assert scene.lights.glow == pytest.approx(np.full((1, 3), glow)), number
+        assert not scene.lights.unlit.any(), number
+
+
+def test_an_image_of_colours_and_one_of_emission(put: Put) -> None:
+    put("glow.png", png(HALF))
+    put("brick.png", png(noise(1)))
+    on = made.stage()
+    made.textured(on)
+    glow = made.texture(on, "/World/paint/glow", "glow.png", st=(0.0, 0.0))
+    surface = UsdShade.Shader.Get(on, "/World/paint/surface")
+    surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(made.rgb(glow))
+    scene = ingest(put("both.usda", on.GetRootLayer().ExportToString().encode()))
+    assert scene.images[0].load() == png(noise(1))
+    assert scene.lights.glow == pytest.approx(np.full((1, 3), 0.5))
+
+
+def test_shaders_that_emit_no_image(read: Any) -> None:
+    on = made.stage()
+    source = made.shader(on, "/World/paint/noise", "Noise")
+    output = source.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+    made.bind(made.mesh(on), made.material(on, "/World/paint", emissiveColor=output))
+    got = read(on)
+    assert got.source.materials[0].glow == (0, 0, 0)
+    assert "emission of Noise ignored" in got.says("PTM-N215")
 
 
 def test_shaders_in_a_circle(read: Any) -> None:
