@@ -169,7 +169,7 @@ class BuildingBaking:
     ) -> None:
         """``albedo``: (T, 3) the mean reflectance of each face of the scene."""
         self._scene, self._lights, self._pieces = scene, lights, pieces
-        self._around = Occluders.from_scene(scene)
+        self._around = Occluders.from_scene(scene, albedo, lights)
         faces = np.flatnonzero(scene.opaque)
         self._corner = scene.corners[faces]
         seen = _visible_sides(pieces, len(scene.triangles))[faces]

@@ -244,12 +244,12 @@ def _light_with_shadows(
         target = lamps.place[lamp]
         sun = lamps.kind[lamp] == _SUN
         target[sun] = origin[row[sun]] - around.size * lamps.way[lamp[sun]]
-        free = around.free(origin[row], target)
+        passed = around.transmittance(origin[row], target)
         # Of each colour the part that is free: without shadows the light is exact.
         sent = times[row, column, None] * lamps.color[lamp]
         every, arrived = (
             np.stack([sum_by_group(row, part, len(origin)) for part in weight.T], axis=1)
-            for weight in (sent, sent * free[:, None])
+            for weight in (sent, sent * passed)
         )
         share = np.divide(arrived, every, out=np.zeros_like(arrived), where=every > 0)
         result[part] = total * share / math.pi

@@ -22,12 +22,54 @@ from ptmtools import arrays
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.embree import ray_tree
 from ptmtools.jit import kernel
+from ptmtools.scene.lights import Lights
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
 
+#: Glass that lets this share of each colour pass counts as clear; most panes that a ray meets.
+CLEAR, _MOST_PANES = 0.9, 16
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**17
 GOLDEN = 0.6180339887498949
+
+
+@dataclass(frozen=True)
+class Panes:
+    """Coloured glass.
+
+    Attributes
+    ----------
+    corner: (n, 3, 3) float32 of its faces, from the middle of the scene.
+    passes: (n, 3) float32 the share of each colour that passes.
+    lift: see `Occluders`.
+    """
+
+    corner: Singles
+    passes: Singles
+    lift: float
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "tree"}
+
+    @cached_property
+    def tree(self) -> Any:
+        """Embree's tree."""
+        return ray_tree(self.corner)
+
+    def transmittance(self, origin: Singles, along: Singles, length: Singles) -> Singles:
+        """(n, 3) the share of each colour that passes along rays of these lengths."""
+        result = np.ones((len(origin), 3), np.float32)
+        rows, start, rest = np.arange(len(origin)), origin, length
+        for _ in range(_MOST_PANES):
+            hit = self.tree.run(start, along[rows], dists=rest.copy(), output=True)
+            met = hit["primID"] >= 0
+            result[rows[met]] *= self.passes[hit["primID"][met]]
+            beyond = hit["tfar"][met] + np.float32(self.lift)
+            rows, rest = rows[met], rest[met] - beyond
+            start = start[met] + beyond[:, None] * along[rows]
+            if not len(rows):
+                break
+        return result
 
 
 @dataclass(frozen=True)
@@ -40,6 +82,7 @@ class Occluders:
     middle: (3,) subtracted before anything goes to float32.
     ground: height of the ground, metres.
     lift: height above its surface at which a ray begins, metres.
+    panes: coloured glass, if there is any.
     """
 
     points: Floats
@@ -47,18 +90,25 @@ class Occluders:
     middle: Floats
     ground: float
     lift: float
+    panes: Panes | None = None
 
     @staticmethod
-    def from_scene(scene: Scene) -> Occluders:
-        """The opaque faces of a scene."""
+    def from_scene(
+        scene: Scene, albedo: Floats | None = None, lights: Lights | None = None
+    ) -> Occluders:
+        """The opaque faces of a scene, and its glass that has a colour, with ``albedo``: (T, 3)
+        mean reflectance of each face."""
         low, high = scene.points.min(axis=0), scene.points.max(axis=0)
-        return Occluders(
-            scene.points,
-            scene.triangles[scene.opaque],
-            (low + high) / 2,
-            float(low[1]),
-            scene.tolerance.plane,
-        )
+        middle, lift = (low + high) / 2, scene.tolerance.plane
+        panes = None
+        if albedo is not None:
+            passes = _passes(scene, albedo, lights)
+            tinted = np.flatnonzero(passes.min(axis=1) < CLEAR)
+            if len(tinted):
+                corner = (scene.corners[tinted] - middle).astype(np.float32)
+                panes = Panes(corner, passes[tinted], lift)
+        triangles = scene.triangles[scene.opaque]
+        return Occluders(scene.points, triangles, middle, float(low[1]), lift, panes)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "tree"}
@@ -87,6 +137,21 @@ class Occluders:
         short = (distance * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
         return np.asarray(self.tree.run(start, along, dists=short, query="OCCLUDED") < 0)
 
+    def transmittance(self, origin: Floats, target: Floats) -> Singles:
+        """(n, 3) the share of each colour that passes from (n, 3) targets on surfaces to points,
+        (n, 3); (n, 1) without coloured glass."""
+        free = self.free(origin, target).astype(np.float32)[:, None]
+        if self.panes is None:
+            return free
+        rows = np.flatnonzero(free)
+        way = (target - origin)[rows]
+        length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
+        start = (origin[rows] - self.middle).astype(np.float32)
+        along = (way / length[:, None]).astype(np.float32)
+        result = np.repeat(free, 3, axis=1)
+        result[rows] = self.panes.transmittance(start, along, length.astype(np.float32))
+        return result
+
     def upright(self, point: Floats, height: float, way: float) -> Floats:
         """(n,) the heights of the first surfaces above (``way`` 1) or below (-1) (n, 3) points, at
         most ``height`` away; the ground's where there is none."""
@@ -101,6 +166,18 @@ class Occluders:
         blocked = hit < limit
         result[blocked] = (point[:, 1] + way * hit)[blocked]
         return result
+
+
+def _passes(scene: Scene, albedo: Floats, lights: Lights | None) -> Singles:
+    """(T, 3) the share of each colour that passes a face: as it shows what is white behind it, or
+    with its own colour if it transmits light. Of a pane each of whose sides is a face, each face
+    lets the root of it pass."""
+    color, material = np.clip(albedo, 0, 1), scene.triangle_material
+    share = np.array([m.opacity if m.opacity < 1 else 0.0 for m in scene.materials])
+    if lights is not None:
+        share = np.maximum(share, lights.transmits)
+    passes = 1 - share[material, None] * (1 - color)
+    return (passes ** np.where(scene.two_sided, 1.0, 0.5)[:, None]).astype(np.float32)
 
 
 def hemisphere(samples: int) -> Singles:

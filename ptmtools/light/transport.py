@@ -119,10 +119,13 @@ class LightField:
             nothing = np.zeros((len(mean), 1), np.float32)
             return mean.astype(np.float32), nothing, nothing
         hit = self.around.tree.run(origin, along, output=True)
+        panes, passed = self.around.panes, np.zeros((0, 3), np.float32)
+        if panes is not None:
+            passed = panes.transmittance(origin, along, hit["tfar"])
         return receive(
             hit["primID"], hit["u"], hit["v"], hit["tfar"], hit["Ng"], along,
             self.patches.split, self.patches.first, self.radiance,
-            self.daylight.sky, self.daylight.ground, samples, near,
+            self.daylight.sky, self.daylight.ground, passed, samples, near,
         )  # fmt: skip
 
 
@@ -202,11 +205,13 @@ def receive(
     radiance: NDArray[np.float32],
     sky: NDArray[np.float64],
     ground: NDArray[np.float64],
+    passed: NDArray[np.float32],
     samples: int,
     near: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """The fields of `Arrived`, the last two (n, 1), for ``samples`` rays of each point, which go
-    ``along`` and meet faces with normals ``across``, of any length."""
+    ``along`` and meet faces with normals ``across``, of any length; a share of each colour, if
+    ``passed`` is not empty, passes."""
     count = len(face) // samples
     light, blocked = np.zeros((count, 3), np.float32), np.zeros((count, 1), np.float32)
     variance = np.zeros((count, 1), np.float32)
@@ -231,6 +236,8 @@ def receive(
                 if start >= 0:
                     k = start + patch_number(split[f], u[ray], v[ray])
                     r, g, b = radiance[k, 0], radiance[k, 1], radiance[k, 2]
+            if len(passed):
+                r, g, b = r * passed[ray, 0], g * passed[ray, 1], b * passed[ray, 2]
             red, green, blue = red + r, green + g, blue + b
             mean = (r + g + b) / 3
             total += mean

@@ -65,6 +65,7 @@ def lights_of(
     return Lights(
         np.array(glow, np.float32).reshape(-1, 3),
         np.array([material.unlit for material in materials], np.bool_),
+        np.array([material.transmits for material in materials], np.float32),
         tuple(_place(lamp, space) for lamp in source.lamps),
         np.full(len(used), -1, np.int32),
         np.zeros((0, 3, 2), np.float32),

@@ -74,6 +74,7 @@ class Lights:
     ----------
     glow: (M, 3) float32 linear radiance that a material emits: red, green and blue.
     unlit: (M,) bool, whether its colours contain their light.
+    transmits: (M,) float32, the share of light that passes, in its colour.
     lamps: those without a surface.
     map: (M,) int32 index into `maps`, -1 of materials without.
     uv: (T, 3, 2) float32 coordinates in the map, origin at the lower left; (0, 3, 2) without maps.
@@ -82,6 +83,7 @@ class Lights:
 
     glow: NDArray[np.float32]
     unlit: NDArray[np.bool_]
+    transmits: NDArray[np.float32]
     lamps: tuple[Lamp, ...]
     map: NDArray[np.int32]
     uv: NDArray[np.float32]
@@ -93,6 +95,7 @@ class Lights:
         return Lights(
             np.zeros((materials, 3), np.float32),
             np.zeros(materials, np.bool_),
+            np.zeros(materials, np.float32),
             (),
             np.full(materials, -1, np.int32),
             np.zeros((0, 3, 2), np.float32),
@@ -100,7 +103,8 @@ class Lights:
         )
 
     def __bool__(self) -> bool:
-        return bool(self.lamps or self.maps or self.glow.any() or self.unlit.any())
+        materials = self.glow, self.unlit, self.transmits
+        return bool(self.lamps or self.maps or any(values.any() for values in materials))
 
     def check(self, materials: int, triangles: int) -> None:
         """Raises ValueError if they are those of a scene with other numbers of these."""
@@ -120,6 +124,7 @@ class Lights:
         return {
             "glow": self.glow,
             "unlit": self.unlit,
+            "transmits": self.transmits,
             "lamp_kind": np.array([KINDS.index(lamp.kind) for lamp in self.lamps], np.uint8),
             "lamp": np.array(rows, np.float64).reshape(-1, 12),
             "map": self.map,
@@ -150,6 +155,7 @@ class Lights:
         return Lights(
             glow,
             stored.array("unlit", np.bool_, len(glow)),
+            stored.array("transmits", np.float32, len(glow), finite=True),
             tuple(
                 Lamp(
                     KINDS[k],

@@ -130,6 +130,7 @@ class SourceMaterial:
     normal: its normal map.
     unlit: the texture shows as it is, and contains its light (KHR_materials_unlit).
     glow, glow_map: linear radiance that it emits, a factor of the mean of the image if it has one.
+    transmits: the share of light that passes, in its colour (KHR_materials_transmission).
     metallic, roughness: as in glTF, factors of the means of their images.
     metallic_map, roughness_map, gloss_map: images, of which `SourceTexture.channel` counts, or red;
         "m" is alpha. That of gloss multiplies 1 - roughness.
@@ -149,6 +150,7 @@ class SourceMaterial:
     unlit: bool = False
     glow: Radiance = (0.0, 0.0, 0.0)
     glow_map: SourceTexture | None = None
+    transmits: float = 0.0
     metallic: float = 0.0
     roughness: float = 1.0
     metallic_map: SourceTexture | None = None

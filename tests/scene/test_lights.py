@@ -278,6 +278,17 @@ def test_emission_of_obj(textured: Callable[..., Path]) -> None:
         assert ("glow.png" in scene.files) == ("glow.png" in mtl)
 
 
+def test_what_transmits_light_tells_how_much(put: Put) -> None:
+    for factor, extra, expected in (
+        (0.5, {}, 0.5),
+        (0.5, {"transmissionTexture": {"index": 0}}, 0),
+    ):
+        glass = {"KHR_materials_transmission": {"transmissionFactor": factor, **extra}}
+        scene = emitting(put, extensions=glass)
+        assert bool(scene.lights) == (expected > 0)
+        assert lights(scene).transmits.tolist() == [expected]
+
+
 BLACK = {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0}
 ALL = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}
 

@@ -345,8 +345,8 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 12
-    changed = "white is balanced for bright light; a cloudy sky is white; glare takes no codes"
+    recipe = 13
+    changed = "white is balanced for bright light; coloured glass colours what passes"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")

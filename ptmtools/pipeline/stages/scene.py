@@ -222,8 +222,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 15
-    changed = "images of emission of USD light and are shown"
+    recipe = 16
+    changed = "images of emission of USD light and are shown; glass says what it transmits"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

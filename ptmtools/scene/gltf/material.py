@@ -118,13 +118,14 @@ class GltfMaterialReader:
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         see_through = entry.get("alphaMode") in ("MASK", "BLEND")
         alpha = _alpha(entry, a)
-        transmission = extensions.get("KHR_materials_transmission", {})
+        transmission, transmits = extensions.get("KHR_materials_transmission", {}), 0.0
         if transmission.get("transmissionFactor", 0) > 0:
             self._notes.note("PTM-N215", f"{name}: transmits light, never occludes", place)
             see_through = True
             blended = alpha["opacity"] < 1 or not (alpha["ignores_alpha"] or use is None)
             if not (blended or "transmissionTexture" in transmission):
-                alpha["opacity"] = 1 - _TRANSMITTED * _share(transmission["transmissionFactor"])
+                transmits = _share(transmission["transmissionFactor"])
+                alpha["opacity"] = 1 - _TRANSMITTED * transmits
 
         placed: _Placed = None, "TEXCOORD_0", np.eye(2, 3), False
         if self._texture_of is not None:
@@ -156,6 +157,7 @@ class GltfMaterialReader:
                 texture=texture,
                 normal=normal,
                 unlit=_UNLIT in extensions,
+                transmits=transmits,
                 **alpha,
                 **parts,
             )
