@@ -464,7 +464,8 @@ class Messages:
             colors=np.zeros((2, 3, 3), np.uint8),
             kinds=("door", ""),
         )
-        images = {0: messages.NamedImage("wall.png", "/a")}
+        image = messages.NamedImage("wall.png", "/a")
+        images = {"texture": {0: image}, "glow_map": {0: image}}
         findings = IngestNotes(self._model)
         findings.note("PTM-N215", "left out", "/b")
         self._answer = messages.pack_source(source, images, findings, str(self._scratch))
