@@ -280,8 +280,7 @@ def _exposure(light: Floats, reflectance: Singles, weight: Floats) -> tuple[floa
     # Eyes get used to what is bright, but not to what glares, as a wall beside a lamp.
     seen = weight[order] * np.minimum(1.0, high / radiance[order])
     mean_light = (seen[:, None] * reflectance[order, None] * light[order]).sum(axis=0)
-    hue = np.maximum(mean_light / luminance(mean_light), _LEAST_HUE)
-    tint = np.log(hue)
+    tint = np.log(np.maximum(mean_light / luminance(mean_light), _LEAST_HUE))
     balanced = (1 - _ADAPTATION) * tint
     # A white surface keeps its luminance.
     kept = np.log(luminance(np.exp(tint)) / luminance(np.exp(balanced)))
