@@ -148,6 +148,17 @@ def test_nothing_was_recorded(opened: Open, campus: Path) -> None:
         assert visitor.page.evaluate("window.ptm.recording") is None
 
 
+#: Of the texture that was drawn last.
+ANISOTROPY = """
+() => {
+  const gl = document.querySelector("#view").getContext("webgl2");
+  const { TEXTURE_MAX_ANISOTROPY_EXT } = gl.getExtension("EXT_texture_filter_anisotropic");
+  gl.activeTexture(gl.TEXTURE0);
+  return gl.getSamplerParameter(gl.getParameter(gl.SAMPLER_BINDING), TEXTURE_MAX_ANISOTROPY_EXT);
+}
+"""
+
+
 def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:
     with opened(campus) as visitor:
         visitor.until("s.complete")
@@ -156,6 +167,7 @@ def test_it_is_drawn_and_walked_on(opened: Open, campus: Path) -> None:
         assert (np.abs(picture.astype(int) - sky).sum(axis=2) > 30).mean() > 0.2
         visitor.frames(30)
         assert visitor.page.evaluate(DRAWS) == 0  # nothing changes any more
+        assert visitor.page.evaluate(ANISOTROPY) == 1  # no card draws
         eye = visitor.state()["pose"]["eye"]
         visitor.page.focus("canvas")
         visitor.page.keyboard.down("w")

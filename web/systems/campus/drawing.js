@@ -1,6 +1,7 @@
 // Draws a campus: the shader of a material follows from the channels that exist (docs/formats/campus.md,
 // "Drawing").
 
+import { isCard } from "../../page/gl/context.js";
 import { aim, programOf } from "../../page/gl/program.js";
 import { corners } from "../../page/gl/shaders.js";
 import { textureFile } from "./index.js";
@@ -53,7 +54,8 @@ export class CampusDrawing {
     this.gl = gl;
     this.index = index;
     this.files = files;
-    this.anisotropy = gl.getExtension("EXT_texture_filter_anisotropic");
+    // As in walks: with software it costs more than it shows.
+    this.anisotropy = isCard(gl) && gl.getExtension("EXT_texture_filter_anisotropic");
   }
 
   /**
