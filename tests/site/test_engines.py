@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import visiting
-from engines import PACKAGES, Engine, EngineVisitor, visiting_by
+from engines import PACKAGES, WITHOUT_CARD, Engine, EngineVisitor, visiting_by
 from numpy.typing import NDArray
 
 from ptmtools.folder_kinds import folder_kinds
@@ -84,7 +84,8 @@ def drawn(state: Mapping[str, Any]) -> list[Any]:
 
 def test_a_walk(engine: Engine, museum: Site, walked: dict[int, Any]) -> None:
     """The cells that are drawn, the pictures and the texels are those of Chromium."""
-    with visiting_by(engine, museum.entries, width=WIDTH, height=HEIGHT) as visitor:
+    sizes = {"width": WIDTH, "height": HEIGHT, "smooth": True}
+    with visiting_by(engine, museum.entries, **sizes) as visitor:
         assert engine.evaluate("matchMedia('(prefers-reduced-motion: reduce)').matches")
         for place, (cells, picture) in walked.items():
             assert drawn(visitor.go(place)) == cells
@@ -266,10 +267,11 @@ def failed(visitor: EngineVisitor) -> str:
 
 @pytest.fixture(scope="module")
 def shown(chromium: Any, forms: dict[str, Site]) -> dict[str, NDArray[np.uint8]]:
-    """Chromium's picture of each form."""
+    """Chromium's picture of each form, without smooth edges, as in the other engines."""
     pictures = {}
     for name, site in forms.items():
         sizes = {"width": WIDTH, "height": HEIGHT, "query": PLACES[name]}
+        sizes["prepare"] = lambda page: page.add_init_script(WITHOUT_CARD)
         with visiting(chromium, site.entries, **sizes) as visitor:
             visitor.until("s.complete")
             visitor.complete()
