@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
+import importlib.util
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,9 +27,31 @@ from ptmtools.scene.orientation.main_axes import tolerance_of
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
+
+def _is_valid_syntax(*given: object) -> bool:
+    """Of rfc3987_syntax, which jsonschema imports and few schemas need: it compiles its grammars,
+    for 4 s, when it is imported."""
+    del sys.modules["rfc3987_syntax"]
+    syntax: bool = importlib.import_module("rfc3987_syntax").is_valid_syntax(*given)
+    return syntax
+
+
+if importlib.util.find_spec("rfc3987_syntax"):
+    sys.modules["rfc3987_syntax"] = SimpleNamespace(is_valid_syntax=_is_valid_syntax)
+
 # Many tests start processes, each of which would compile the package.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """The garbage collector looks through modules and tests neither while they come, nor later."""
+    gc.disable()
+    yield
+    gc.freeze()
+    gc.enable()
+
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
