@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ptmtools.cli.main import main
+from ptmtools.site import responses
 from ptmtools.site.content import Site, SiteOptions, site_of
 
 HERE = Path(__file__).resolve().parent
@@ -31,6 +32,14 @@ __all__ = ["Ptm", "campus", "pictures", "ptm", "statue", "two_rooms"]
 #: Each file by itself, to be damaged, left out and counted; `test_opening_page.py` has openings.
 PLAIN = SiteOptions(pictures=False, opening=False)
 Visiting = Callable[..., AbstractContextManager[Visitor]]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compressed_once() -> Iterator[None]:
+    """A server compresses each file at its first request, and each visit has its own server."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(responses, "compress", lru_cache(512)(responses.compress))
+        yield
 
 
 @pytest.fixture
