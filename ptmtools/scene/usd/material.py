@@ -280,12 +280,13 @@ def _number(value: Any, default: float) -> float:
 
 
 def _numbers(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
-    """The numbers of a value, or the default if these differ in type or count."""
+    """The finite numbers of a value, or the default if these differ in type or count."""
     try:
         numbers = tuple(map(float, value))
     except (TypeError, ValueError):
         return default
-    return numbers if len(numbers) == len(default) else default
+    finite = all(map(math.isfinite, numbers))
+    return numbers if finite and len(numbers) == len(default) else default
 
 
 def _path_of(file: Any) -> str:
@@ -342,8 +343,12 @@ class UsdPainter:
             entry, corners = self._material(prim, shape, key, surface, two_sided)
             use = entry, surface.image, surface.glow_map
             material[faces] = self._number.setdefault(use, len(self._number))
-            if surface.image is not None or surface.coords:
+            if surface.image is not None:
                 uv[faces] = self._coordinates(prim, shape, key, surface)[faces]
+            elif surface.coords:
+                # Of an image of emission: lights are optional.
+                with self._notes.optional():
+                    uv[faces] = self._coordinates(prim, shape, key, surface)[faces]
             if corners is not None:
                 if colors is None:
                     colors = np.full((len(index), 3, 3), 255, dtype=np.uint8)

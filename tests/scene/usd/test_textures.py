@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -230,6 +231,7 @@ def test_other_emissions_of_images_light_by_their_mean(put: Put) -> None:
             ({}, {"diffuseColor": (0.2, 0, 0)}, 0.5),
             ({"file": "gone.png"}, {"diffuseColor": (0, 0, 0)}, 1),
             ({"file": "glow.<UDIM>.png"}, {}, 0),
+            ({"scale": (math.inf, 1, 1, 1)}, {"diffuseColor": (1, 1, 1)}, 0.5),
             ({"bias": (0.1, 0, 0, 0)}, {}, 0.5),
         )
     ):
@@ -239,6 +241,16 @@ def test_other_emissions_of_images_light_by_their_mean(put: Put) -> None:
         assert scene.materials[0].image == -1, number
         assert scene.lights.glow == pytest.approx(np.full((1, 3), glow)), number
         assert not scene.lights.unlit.any(), number
+
+
+def test_coordinates_of_an_emission_are_optional(put: Put) -> None:
+    put("glow.png", png(HALF))
+    on = screen({}, diffuseColor=(0, 0, 0))
+    (wall,) = (prim for prim in on.Traverse() if prim.IsA(UsdGeom.Mesh))
+    UsdGeom.PrimvarsAPI(wall).GetPrimvar("st").Set([(0.0, 0.0)])
+    model = put("screen.usda", on.GetRootLayer().ExportToString().encode())
+    scene = ingest(model, IngestOptions(strict=True))
+    assert scene.lights.glow == pytest.approx(np.full((1, 3), 0.5))
 
 
 def test_an_image_of_colours_and_one_of_emission(put: Put) -> None:
