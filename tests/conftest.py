@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,12 +29,17 @@ settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 
+@cache
+def _syntax() -> Any:
+    del sys.modules["rfc3987_syntax"]
+    return importlib.import_module("rfc3987_syntax")
+
+
 def _is_valid_syntax(*given: object) -> bool:
     """Of rfc3987_syntax, which jsonschema imports and few schemas need: it compiles its grammars,
     for 4 s, when it is imported."""
-    del sys.modules["rfc3987_syntax"]
-    syntax: bool = importlib.import_module("rfc3987_syntax").is_valid_syntax(*given)
-    return syntax
+    valid: bool = _syntax().is_valid_syntax(*given)
+    return valid
 
 
 if importlib.util.find_spec("rfc3987_syntax"):
