@@ -55,7 +55,9 @@ _LEAST = 0.01
 _WHITE, _ROOM = 0.995, 1.9
 #: What shows as this many times white shows as no more: the spot beside a lamp would take the codes
 #: of the room.
-_GLARE = 16.0
+_GLARE = 4.0
+#: The factor by which exposures of cells differ from that of the building at most.
+FARTHEST = 4.0
 #: The mean of the logarithms of what surfaces reflect shows as this, as that of a photograph does,
 #: and a white surface in the usual light as the other number, so that white rooms are not grey.
 _KEY, _KEY_OF_WHITE = 0.3, 0.7
@@ -155,7 +157,7 @@ class LightBaking:
         sample, weight = np.concatenate(samples), np.concatenate(weights)
         reflectance = self.reflectance[np.concatenate(faces)]
         shown = _exposure(sample.astype(np.float64), reflectance, weight)
-        white = self._white(sample, weight, shown[0])
+        white = self._white(sample, reflectance, weight, shown[0])
         shares = encode_srgb(vertex.astype(np.float64) / white)
         return CellLight(
             mapped,
@@ -241,13 +243,17 @@ class LightBaking:
         samples = math.ceil(rays * self.options.light_samples)
         return self.building.look(corner[rows], side[rows], samples, 0.0)
 
-    def _white(self, light: Singles, weight: Floats, exposure: float) -> float:
-        """The white of a cell with this (n, 3) light and logarithm of its exposure."""
+    def _white(
+        self, light: Singles, reflectance: Singles, weight: Floats, exposure: float
+    ) -> float:
+        """The white of a cell with this (n, 3) light on surfaces of (n,) reflectance, and this
+        logarithm of its exposure."""
         if self.building is None:
             return 1.0
-        bright = light[weight > 0].max(axis=1, initial=0.0)
+        exposure = min(exposure, math.log(FARTHEST * _KEY_OF_WHITE / self.building.usual))
+        glare = _GLARE / (math.exp(exposure) * np.maximum(reflectance.astype(float), SMALLEST))
+        bright = np.minimum(light.max(axis=1, initial=0.0), glare)[weight > 0]
         white = _ROOM * float(np.quantile(bright, _WHITE)) if len(bright) else 0.0
-        white = min(white, _GLARE / math.exp(exposure))
         # Three digits, as in GLBs.
         return float(f"{white:.3g}") if white > 0 else self.building.usual
 

@@ -59,8 +59,6 @@ if TYPE_CHECKING:
     from ptmtools.store.transaction import Transaction
     from ptmtools.texture.sources import PtmSource
 
-#: Natural logarithm of the factor by which exposures of cells differ from the building's at most.
-_MOST_STOPS = math.log(4)
 #: Lightmaps with less than this share of the texels to the metre that were asked for are reported.
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
@@ -239,6 +237,8 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
     red, green and blue of cells: some of what is seen from a cell is in its neighbours."""
     import numpy as np
 
+    from ptmtools.light.cells import FARTHEST
+
     wanted = np.array([light.exposure for light in cell_lights])
     balance = np.array([light.balance for light in cell_lights]).reshape(-1, 3)
     area = np.array([light.area for light in cell_lights])
@@ -254,7 +254,7 @@ def _exposures(cell_lights: Sequence[CellLight], cells: Cells) -> tuple[float, N
         total[cell] += (values[near] * beside[:, None]).sum(axis=0)
         weight[cell] += beside.sum()
     wished = np.divide(total, weight[:, None], out=np.zeros_like(total), where=weight[:, None] > 0)
-    limited = np.clip(wished[:, :1], -_MOST_STOPS, _MOST_STOPS)
+    limited = np.clip(wished[:, :1], -math.log(FARTHEST), math.log(FARTHEST))
     return math.exp(usual), np.exp(limited + wished[:, 1:])
 
 
