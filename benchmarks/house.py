@@ -42,12 +42,12 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (68_980, 335),
+    "ptmtools": (69_010, 335),
     "ptmtools/*.py": (4_150, 26),
     "ptmtools/cells": (7_990, 26),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
-    "ptmtools/light": (3_370, 15),
+    "ptmtools/light": (3_395, 15),
     "ptmtools/meshopt": (870, 5),
     "ptmtools/output": (8_110, 39),
     "ptmtools/pipeline": (4_050, 20),

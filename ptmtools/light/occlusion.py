@@ -26,8 +26,9 @@ from ptmtools.scene.lights import Lights
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
 
-#: Glass that lets this share of each colour pass counts as clear; most panes that a ray meets.
-CLEAR, _MOST_PANES = 0.9, 16
+#: Glass that lets this share of each colour pass counts as clear; the faces of it on a ray that
+#: count; and metres between the two sides of a pane at most.
+CLEAR, _MOST_FACES, _THICK = 0.9, 16, 0.05
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**17
 GOLDEN = 0.6180339887498949
@@ -49,26 +50,41 @@ class Panes:
     lift: float
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "tree"}
+        return {name: value for name, value in vars(self).items() if name not in ("tree", "normal")}
 
     @cached_property
     def tree(self) -> Any:
         """Embree's tree."""
         return ray_tree(self.corner)
 
+    @cached_property
+    def normal(self) -> Singles:
+        """(n, 3) unit normals."""
+        return normals(self.corner.astype(np.float64)).astype(np.float32)
+
     def transmittance(self, origin: Singles, along: Singles, length: Singles) -> Singles:
-        """(n, 3) the share of each colour that passes along rays of these lengths."""
+        """(n, 3) the share of each colour that passes along rays of these lengths. Faces of one
+        colour in one place are the sides of a pane, which counts once."""
         result = np.ones((len(origin), 3), np.float32)
         rows, start, rest = np.arange(len(origin)), origin, length
-        for _ in range(_MOST_PANES):
+        # The face that a ray met before, and the way from there.
+        before, way = np.full(len(origin), -1), np.zeros(len(origin), np.float32)
+        for _ in range(_MOST_FACES):
             hit = self.tree.run(start, along[rows], dists=rest.copy(), output=True)
             met = hit["primID"] >= 0
-            result[rows[met]] *= self.passes[hit["primID"][met]]
-            beyond = hit["tfar"][met] + np.float32(self.lift)
-            rows, rest = rows[met], rest[met] - beyond
-            start = start[met] + beyond[:, None] * along[rows]
+            rows, face, reached = rows[met], hit["primID"][met], hit["tfar"][met]
             if not len(rows):
                 break
+            depth = np.abs(np.einsum("nx,nx->n", self.normal[face], along[rows]))
+            depth *= way[rows] + reached
+            last = before[rows]
+            again = (last >= 0) & (depth <= _THICK)
+            again &= (self.passes[face] == self.passes[last]).all(axis=1)
+            result[rows[~again]] *= self.passes[face[~again]]
+            before[rows] = np.where(again & (face != last), -1, face)
+            beyond = reached + np.float32(self.lift)
+            way[rows] = self.lift
+            rest, start = rest[met] - beyond, start[met] + beyond[:, None] * along[rows]
         return result
 
 
@@ -128,13 +144,9 @@ class Occluders:
 
     def free(self, origin: Floats, target: Floats) -> Bools:
         """(n,) whether nothing is between (n, 3) points and their targets, (n, 3), on surfaces."""
-        way = target - origin
-        distance = np.linalg.norm(way, axis=1)
         if self.tree is None:
-            return np.ones(len(distance), np.bool_)
-        along = (way / np.maximum(distance, np.finfo(float).tiny)[:, None]).astype(np.float32)
-        start = (origin - self.middle).astype(np.float32)
-        short = (distance * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
+            return np.ones(len(origin), np.bool_)
+        start, along, short = self._rays_between(origin, target)
         return np.asarray(self.tree.run(start, along, dists=short, query="OCCLUDED") < 0)
 
     def transmittance(self, origin: Floats, target: Floats) -> Singles:
@@ -144,13 +156,18 @@ class Occluders:
         if self.panes is None:
             return free
         rows = np.flatnonzero(free)
-        way = (target - origin)[rows]
-        length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
-        start = (origin[rows] - self.middle).astype(np.float32)
-        along = (way / length[:, None]).astype(np.float32)
+        start, along, short = self._rays_between(origin[rows], target[rows])
         result = np.repeat(free, 3, axis=1)
-        result[rows] = self.panes.transmittance(start, along, length.astype(np.float32))
+        result[rows] = self.panes.transmittance(start, along, short)
         return result
+
+    def _rays_between(self, origin: Floats, target: Floats) -> tuple[Singles, Singles, Singles]:
+        """Origins, directions and lengths of rays that end before surfaces at (n, 3) targets."""
+        way = target - origin
+        distance = np.linalg.norm(way, axis=1)
+        along = (way / np.maximum(distance, np.finfo(float).tiny)[:, None]).astype(np.float32)
+        short = (distance * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
+        return (origin - self.middle).astype(np.float32), along, short
 
     def upright(self, point: Floats, height: float, way: float) -> Floats:
         """(n,) the heights of the first surfaces above (``way`` 1) or below (-1) (n, 3) points, at
@@ -170,14 +187,15 @@ class Occluders:
 
 def _passes(scene: Scene, albedo: Floats, lights: Lights | None) -> Singles:
     """(T, 3) the share of each colour that passes a face: as it shows what is white behind it, or
-    with its own colour if it transmits light. Of a pane each of whose sides is a face, each face
-    lets the root of it pass."""
-    color, material = np.clip(albedo, 0, 1), scene.triangle_material
-    share = np.array([m.opacity if m.opacity < 1 else 0.0 for m in scene.materials])
+    with its own colour if it transmits light. Images with alpha are leaves and fences."""
+    color = np.clip(albedo, 0, 1)
+    share = np.array([
+        m.opacity if m.opacity < 1 and (m.image < 0 or scene.images[m.image].plain) else 0.0
+        for m in scene.materials
+    ])  # fmt: skip
     if lights is not None:
         share = np.maximum(share, lights.transmits)
-    passes = 1 - share[material, None] * (1 - color)
-    return (passes ** np.where(scene.two_sided, 1.0, 0.5)[:, None]).astype(np.float32)
+    return (1 - share[scene.triangle_material, None] * (1 - color)).astype(np.float32)
 
 
 def hemisphere(samples: int) -> Singles:
