@@ -32,6 +32,10 @@ SIZE = np.array([6.0, 3.0, 5.0])
 QUADS = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
 EYE, FIELD = [3.0, 1.6, 4.5], 1.1
 COUNT = 9
+#: Every answer counts as one of HTTP/2.
+SECOND_PROTOCOL = """
+Object.defineProperty(PerformanceResourceTiming.prototype, "nextHopProtocol", { get: () => "h2" });
+"""
 
 
 @pytest.fixture(scope="module")
@@ -212,12 +216,21 @@ class Held:
 
 
 def test_exact_levels_replace_previews_in_place(visit: Callable[..., Any], room: Site) -> None:
-    """Those of a file with tiles; without another storage, and without fading."""
+    """Those of a file with tiles; without another storage, and without fading.
+
+    Requests that are held must leave room for those of all previews, also at few frames a second:
+    the page takes the connection for one of HTTP/2, where it has more requests open.
+    """
     previews = [Preview(6), Preview(8, options={"quality": 95})]
     texture = Texture(corners_of(256, 256), previews, tile=128)
     site = with_previews(room, dict.fromkeys(range(COUNT), texture))
     held = Held("*.ptm")
-    with visit(site, prepare=held.hold) as visitor:
+
+    def prepare(page: Any) -> None:
+        page.add_init_script(SECOND_PROTOCOL)
+        held.hold(page)
+
+    with visit(site, prepare=prepare) as visitor:
         visitor.until("s.held?.every((held) => held === 9)")
         state = visitor.state()
         assert (state["previews"], state["exact"], state["complete"]) == (COUNT, False, False)
