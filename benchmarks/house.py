@@ -42,9 +42,9 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (69_010, 335),
+    "ptmtools": (69_035, 335),
     "ptmtools/*.py": (4_150, 26),
-    "ptmtools/cells": (7_990, 26),
+    "ptmtools/cells": (8_014, 26),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
     "ptmtools/light": (3_395, 15),

@@ -162,7 +162,7 @@ class Building:
         places = find_places(floors, solid, walker, tolerance, executor)
         ceiling = None
         if options.ceiling == "auto":
-            ceiling = ceiling_height(structure, walls, walker, options.wall_area)
+            ceiling = ceiling_height(doors.floor, walls, walker)
         volumes = Volumes.from_scene(scene, options)
         wide, tight = _root_boxes(fabric, structure)
         shaped = fabric.source[fabric.shaped]

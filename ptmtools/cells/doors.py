@@ -32,16 +32,15 @@ from ptmtools.cells.fabric import (
     is_door_name,
     triangles_named,
 )
-from ptmtools.cells.floors import ROOFED, Floors, roofed_share
+from ptmtools.cells.floors import ROOFED, Floors, SampledFloor
 from ptmtools.cells.model import descend
-from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.places import spread
+from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.planar import Geometry
 from ptmtools.cells.planes import bounds
 from ptmtools.cells.portals import Portal, find_portals, flood
 from ptmtools.cells.search import Nearby, connect, distinct
 from ptmtools.cells.split_planes import DoorPlanes
-from ptmtools.cells.structure import Structure, Surroundings, spread_over
+from ptmtools.cells.structure import Structure, Surroundings, sample, spread_over
 from ptmtools.scene.model import Scene
 
 #: A leaf is thinner than this, metres,
@@ -262,7 +261,7 @@ class Doors:
     leaves: list[DoorLeaf]
     leaf_of_triangle: Ints  # (T,) the leaf to which each triangle of the structure belongs, or -1
     glass: Floats  # (n, 3, 3) transparent triangles, metres
-    roofed: bool  # whether the building has roofs or ceilings
+    floor: SampledFloor
     planes: DoorPlanes
     unrecognised: tuple[str, ...]  # objects with a door's name or material, none in a leaf
 
@@ -273,17 +272,17 @@ class Doors:
         leaf = np.full(len(scene.triangles), -1)
         for i, door in enumerate(leaves):
             leaf[door.triangles] = i
-        glass, roofed = scene.corners[~scene.opaque], True
         if leaves:
             structure = Structure.from_fabric(fabric, structure.tolerance, leaf >= 0)
-            roofed = roofed_share(structure.corners, fabric.options.wall_area) >= ROOFED
         leaf_of_triangle = leaf[structure.source]
         across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
         planes = DoorPlanes.from_structure(structure, leaf_of_triangle, across)
         named = np.unique(scene.triangle_object[triangles_named(scene, is_door_name)])
         walls = np.setdiff1d(named, scene.triangle_object[leaf >= 0])
         unrecognised = tuple(scene.objects[i] for i in walls)
-        return Doors(leaves, leaf_of_triangle, glass, roofed, planes, unrecognised), structure
+        floor = SampledFloor.from_structure(structure, Walker(*fabric.options.walker).radius)
+        glass = scene.corners[~scene.opaque]
+        return Doors(leaves, leaf_of_triangle, glass, floor, planes, unrecognised), structure
 
     def triangles(self, which: Bools) -> NDArray[np.int32]:
         """The triangles of the scene, ascending, of the leaves ``which``, (d,)."""
@@ -311,9 +310,8 @@ class Doors:
         """(d,) which leaves have walls around and a roof above the ways on both sides."""
         around = Surroundings(np.concatenate([structure.corners, self.glass]), structure.tolerance)
         ways = (_ways(door, around) for door in self.leaves)
-        enclosed = [
-            all(around.enclose(points, self.roofed).all() for points in way) for way in ways
-        ]
+        roofed = self.floor.roof_share >= ROOFED
+        enclosed = [all(around.enclose(points, roofed).all() for points in way) for way in ways]
         return np.array(enclosed, dtype=bool)
 
     def lead_out(self, portals: list[Portal], outside: Bools) -> Bools:
@@ -423,7 +421,7 @@ class Enclosure:
     Attributes
     ----------
     doors: names of the recognised door leaves, in the order of the file.
-    roofed: share of the floor, by area, that has a surface above it.
+    roofed: share of the floor between walls, by area, that has a surface above it.
     rooms: number of points in rooms, under a roof and between walls, that sight lines start from.
     leaving: share of these lines that leave the model; 0 without rooms.
     """
@@ -448,17 +446,15 @@ def enclosure(scene: Scene, options: SubdivideOptions | None = None) -> Enclosur
     corners, names = structure.corners, tuple(leaf.name for leaf in doors.leaves)
     if not len(corners):
         return Enclosure(names, 0.0, 0, 0.0)
-    floors = Floors.from_fabric(fabric)
     around = Surroundings(corners, tolerance)
-    points, _ = spread(floors.corners)
-    points = spread_over(points, 4 * _POINTS) + [0.0, _EYE, 0.0]
+    points = sample(Floors.from_fabric(fabric).corners, 4 * _POINTS) + [0.0, _EYE, 0.0]
     points = spread_over(points[around.enclose(points)], _POINTS)
     leaving = 0.0
     if len(points):
         along = np.tile(_sphere(_LINES), (len(points), 1))
         distance, _ = around.first(np.repeat(points, _LINES, axis=0), along)
         leaving = float(np.isinf(distance).mean())
-    return Enclosure(names, roofed_share(corners, options.wall_area), len(points), leaving)
+    return Enclosure(names, doors.floor.roof_share, len(points), leaving)
 
 
 def _sphere(count: int) -> Floats:

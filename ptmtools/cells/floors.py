@@ -29,10 +29,10 @@ from ptmtools.cells.fabric import Fabric, facets_of
 from ptmtools.cells.options import Walker
 from ptmtools.cells.planar import Geometry, unite_rows
 from ptmtools.cells.planes import PLAN, PlaneFrame, Polyhedron, bounds, section
-from ptmtools.cells.portals import FLOOR_COSINE, plumb
+from ptmtools.cells.portals import FLOOR_COSINE
 from ptmtools.cells.search import distinct
-from ptmtools.cells.structure import Structure, WallPlane
-from ptmtools.tolerance import Tolerance, rank
+from ptmtools.cells.structure import INSIDE, Structure, Surroundings, WallPlane, sample
+from ptmtools.tolerance import Tolerance
 
 #: Number of small regions from which a floor is a scan.
 _SCAN = 20_000
@@ -123,12 +123,14 @@ def _slopes(corners: Floats, region: Ints, patch: Bools) -> Floats:
     return np.column_stack([slope, np.where(patch, top, level)])
 
 
-#: The largest floor triangles, this many, represent the whole floor.
-FLOOR_SAMPLES = 400
+#: Points that represent the floor.
+_POINTS = 4096
+#: Parts of it are smaller than the area among walls divided by this number.
+_PARTS = 256
 #: Surfaces nearer to one another than head room, metres, or this share of the model's height, are
 #: the two sides of a slab, or furniture.
 HEAD_ROOM, SLAB_SHARE = 1.5, 1 / 3
-#: A model is open above if less than this share of its floor has a surface above it.
+#: A building is open above if less than this share of its floor has a surface above it.
 ROOFED = 0.5
 #: Heights of floors, metres, that are compared together.
 _STOREY = 0.5
@@ -140,54 +142,61 @@ _ALIKE, _SPREAD = 0.25, 0.5
 _LEANS = 0.02
 
 
-def roofed_share(corners: Floats, floor_area: float) -> float:
-    """Share of the floor of (T, 3, 3) triangles, by area, that has a surface above it (1 without
-    any floor). See `_floors`."""
-    _, area, covered = _floors(corners, floor_area)
-    total = float(area.sum())
-    return float(area[covered].sum()) / total if total else 1.0
+@dataclass(frozen=True)
+class SampledFloor:
+    """Points spread by area over the level surfaces between walls: no roofs, and no land around a
+    building. (Tried: the middles of the largest triangles, all of which may be under skylights.)"""
+
+    height: Floats  # (n,) metres
+    covered: Bools  # (n,) whether a surface is above head room over each
+
+    @staticmethod
+    def from_structure(structure: Structure, radius: float) -> SampledFloor:
+        """``radius``: of a body that fits, metres, unlike in a wall."""
+        corners = structure.corners
+        level = np.abs(structure.planes[:, 1]) >= FLOOR_COSINE
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        apart = min(HEAD_ROOM, SLAB_SHARE * float(np.ptp(corners[:, :, 1]))) if len(corners) else 0
+        tall = ~level & (high[:, 1] - low[:, 1] >= apart)
+        if not (tall.any() and level.any()):
+            return SampledFloor(np.zeros(0), np.zeros(0, dtype=bool))
+        among = low[tall].min(axis=0)[PLAN], high[tall].max(axis=0)[PLAN]
+        eyes = sample(_parts_in(corners[level], *among), _POINTS) + [0.0, apart, 0.0]
+        around = Surroundings(corners, structure.tolerance)
+        wide = around.free_about(eyes)
+        eyes = eyes[(np.isfinite(wide).mean(axis=1) >= INSIDE) & (wide.min(axis=1) >= radius)]
+        return SampledFloor(eyes[:, 1] - apart, around.cover(eyes))
+
+    @property
+    def roof_share(self) -> float:
+        """The share that has a surface above it; 1 without any floor."""
+        return float(self.covered.mean()) if len(self.covered) else 1.0
 
 
-def _floors(corners: Floats, floor_area: float) -> tuple[Floats, Floats, Bools]:
-    """(n,) heights and (n,) areas of floor triangles, m and m², and (n,) whether a surface is above
-    each.
-
-    Floor is every level triangle of at least a tenth of ``floor_area`` m²; of triangles above one
-    another only the lowest is floor, the others are ceilings.
-    """
-    normal = normals(corners)
-    area = np.linalg.norm(normal, axis=1) / 2
-    level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
-    floor = np.flatnonzero(level & (area >= floor_area / 10))
-    order = floor[rank(area[floor])][:FLOOR_SAMPLES]
-    height = float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
-    apart = min(HEAD_ROOM, SLAB_SHARE * height)
-    walkable = corners[level]
-    low, high = walkable.min(axis=1), walkable.max(axis=1)
-    rows: list[tuple[float, float, bool]] = []
-    for triangle in order:
-        eye = corners[triangle].mean(axis=0)
-        around = (low <= eye) & (eye <= high)
-        heights = plumb(eye, walkable[around[:, 0] & around[:, 2]])
-        if not np.any(heights < -apart):
-            covered = bool(np.any(heights > apart))
-            rows.append((float(eye[1]), float(area[triangle]), covered))
-    at, size, covers = np.array(rows).reshape(-1, 3).T
-    return at, size, covers > 0
+def _parts_in(corners: Floats, low: Floats, high: Floats) -> Floats:
+    """The small parts of triangles, (n, 3, 3), that meet a rectangle in plan: a floor may be that
+    of a wide meadow."""
+    while True:
+        flat = corners[:, :, PLAN]
+        corners = corners[((flat.min(axis=1) <= high) & (flat.max(axis=1) >= low)).all(axis=1)]
+        large = areas(corners) > np.prod(high - low) / _PARTS
+        if not large.any():
+            return corners
+        a, b, c = corners[large].transpose(1, 0, 2)
+        d, e, f = (b + c) / 2, (c + a) / 2, (a + b) / 2
+        quarters = [np.stack(part, axis=1) for part in ((a, f, e), (f, b, d), (e, d, c), (d, e, f))]
+        corners = np.concatenate([corners[~large], *quarters])
 
 
-def ceiling_height(
-    structure: Structure, walls: list[WallPlane], walker: Walker, floor_area: float
-) -> float | None:
-    """The height, metres in world coordinates, at which rooms of a building without ceilings end;
-    None for buildings with ceilings, and where walls have no common height."""
-    at, area, covered = _floors(structure.corners, floor_area)
-    if not area.sum() or area[covered].sum() >= ROOFED * area.sum():
+def ceiling_height(floor: SampledFloor, walls: list[WallPlane], walker: Walker) -> float | None:
+    """The height, metres in world coordinates, at which rooms of a building end whose storey with
+    most open floor is mostly open, with those above; None where walls have no common height."""
+    storey = np.floor(floor.height / _STOREY)
+    names, number = np.unique(storey[~floor.covered], return_counts=True)
+    main = names[number.argmax()] if len(names) else np.inf
+    if not len(names) or floor.covered[storey >= main].mean() >= ROOFED:
         return None
-    at, area = at[~covered], area[~covered]
-    storey, row = np.unique(np.floor(at / _STOREY), return_inverse=True)
-    main = int(np.argmax(np.bincount(row, area, len(storey))))
-    eyes = float(at[row == main].max()) + walker.reach
+    eyes = float(floor.height[(storey == main) & ~floor.covered].max()) + walker.reach
     top, length = _tops(walls, eyes)
     if not length.sum():
         return None

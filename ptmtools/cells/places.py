@@ -38,6 +38,7 @@ from ptmtools.cells.planar import (
 )
 from ptmtools.cells.planes import PLAN, Polyhedron, boxes_meet
 from ptmtools.cells.search import ByHeight, along_a_curve
+from ptmtools.cells.structure import points_in
 from ptmtools.executor import Executor
 from ptmtools.tolerance import TOUCH_SHARE, Tolerance
 
@@ -263,8 +264,6 @@ def halves(shapes: Geometry, grid: float) -> tuple[Geometry, Ints]:
 
 #: Places are sampled once in this area, m², and so often at most.
 _SAMPLE_AREA, _MOST_SAMPLES = 0.05, 500_000
-#: 1/g and 1/g², where g³ = g + 1 (Roberts' sequence): where in a triangle.
-_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 @dataclass(frozen=True)
@@ -421,10 +420,8 @@ def spread(corners: Floats) -> tuple[Floats, Floats]:
     sample_area = max(_SAMPLE_AREA, float(size.sum()) / _MOST_SAMPLES)
     number = np.maximum(np.ceil(size / sample_area), 1).astype(np.int64)
     row = np.repeat(np.arange(len(corners)), number)
-    share = np.mod((ranges(np.zeros_like(number), number)[:, None] + 0.5) * _STEPS, 1.0)
-    share = np.where(share.sum(axis=1, keepdims=True) > 1, 1 - share, share)
-    weight = np.column_stack([1 - share.sum(axis=1), share])
-    return np.einsum("mc,mcx->mx", weight, corners[row]), (size / number)[row]
+    points = points_in(corners[row], ranges(np.zeros_like(number), number))
+    return points, (size / number)[row]
 
 
 #: Eyes stay farther from what the body touches than rounding, but by no more of its radius.

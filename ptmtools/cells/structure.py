@@ -20,7 +20,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, normals, sum_by_group
+from ptmtools.arrays import Bools, Floats, Ints, areas, normals, sum_by_group
 from ptmtools.cells.fabric import Fabric, Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
@@ -218,13 +218,32 @@ _MANY = 1000
 #: Level rays from a point.
 _RAYS = 32
 #: A point is inside if at least this share of them meets a wall: under eaves half of them do.
-_INSIDE = 0.75
+INSIDE = 0.75
 #: Points are inside a solid if at least this share of the walls around them faces away.
 _AWAY = 0.9
 #: Number of points that look at the walls around.
 LOOKS = 16
 #: Points whose level rays are shot at a time.
 _AT_ONCE = 1 << 14
+#: 1/g and 1/g², where g³ = g + 1 (Roberts' sequence): where in a triangle.
+_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
+
+
+def points_in(corners: Floats, number: Ints) -> Floats:
+    """(n, 3) points in (n, 3, 3) triangles, those of a ``number``, (n,), in a sequence that fills a
+    triangle evenly."""
+    share = np.mod((number[:, None] + 0.5) * _STEPS, 1.0)
+    share = np.where(share.sum(axis=1, keepdims=True) > 1, 1 - share, share)
+    weight = np.column_stack([1 - share.sum(axis=1), share])
+    return np.asarray(np.einsum("nc,ncx->nx", weight, corners))
+
+
+def sample(corners: Floats, count: int) -> Floats:
+    """(count, 3) points spread by area over (n, 3, 3) triangles; none without an area."""
+    total = np.cumsum(areas(corners))
+    number = np.arange(count if len(total) and total[-1] > 0 else 0)
+    row = np.searchsorted(total, (number + 0.5) / count * total[-1:])
+    return points_in(corners[row], number)
 
 
 def spread_over(points: Floats, count: int) -> Floats:
@@ -264,6 +283,16 @@ class Surroundings:
         result: Bools = ((hit >= 0) & (self._front[hit, 1] > 0)).all(axis=0)
         return result
 
+    def cover(self, points: Floats) -> Bools:
+        """(n,) whether a surface is straight above each of (n, 3) points."""
+        result: Bools = self._hits(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))[0] >= 0
+        return result
+
+    def free_about(self, points: Floats) -> Floats:
+        """(n, r) metres that r level rays from each of (n, 3) points go, infinite without a hit."""
+        along = np.tile(self._level, (len(points), 1))
+        return self.first(np.repeat(points, _RAYS, axis=0), along)[0].reshape(-1, _RAYS)
+
     def first(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
         """The first surfaces that rays from (n, 3) points along (n, 3) unit vectors meet: (n,)
         distances, metres, infinite without a hit, and (n, 3) unit normals."""
@@ -283,11 +312,9 @@ class Surroundings:
         result = np.zeros(len(points), dtype=np.bool_)
         for first in range(0, len(points), _AT_ONCE):
             some = points[first : first + _AT_ONCE]
-            above = self._hits(some, np.tile([0.0, 1.0, 0.0], (len(some), 1)))[0] >= 0
-            under = np.flatnonzero(above | (not roofed))
-            along = np.tile(self._level, (len(under), 1))
-            met = self._hits(np.repeat(some[under], _RAYS, axis=0), along)[0] >= 0
-            result[first + under] = met.reshape(-1, _RAYS).mean(axis=1) >= _INSIDE
+            under = np.flatnonzero(self.cover(some)) if roofed else np.arange(len(some))
+            met = np.isfinite(self.free_about(some[under]))
+            result[first + under] = met.mean(axis=1) >= INSIDE
         return result
 
     def _hits(self, points: Floats, along: Floats) -> Ints:

@@ -30,7 +30,7 @@ from ptmtools.cells.diagnostics import (
 )
 from ptmtools.cells.doors import THICK
 from ptmtools.cells.fabric import matches
-from ptmtools.cells.floors import ROOFED, roofed_share
+from ptmtools.cells.floors import ROOFED
 from ptmtools.cells.joining import join_pieces
 from ptmtools.cells.model import OUTSIDE, Cells, descend
 from ptmtools.cells.options import SubdivideOptions
@@ -95,8 +95,7 @@ def _divide_building(
         space = divide(building, wide, progress)
         if not space.closed:
             outside, space = space, replace(clipped.result(), closed=False)
-            roofed = roofed_share(building.structure.corners, building.options.wall_area)
-            notes.append(_open_note(outside, roofed, tight, space.ceiling))
+            notes.append(_open_note(outside, building.doors.floor.roof_share, tight, space.ceiling))
     finally:
         clipped.cancel()
     limit, many = building.options.max_leaves, _portal_count(space) > MOST_PORTALS
@@ -171,7 +170,8 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
 
 
 def _open_note(space: DividedSpace, roofed: float, box: Floats, ceiling: float | None) -> str:
-    if roofed < ROOFED:
+    roofless = roofed < ROOFED or ceiling is not None
+    if roofless:
         state = f"open at the top: {1 - roofed:.0%} of the floor has no ceiling"
     elif not space.reached.any():
         state = "open: no room is closed off from the outside"
@@ -180,11 +180,8 @@ def _open_note(space: DividedSpace, roofed: float, box: Floats, ceiling: float |
     size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
     note = f"the model is {state}; cells end at the bounding box of its walls, {size} m"
     if ceiling is not None:
-        note += (
-            f", and rooms at the tops of their walls, at {ceiling:.2f} m (--ceiling none changes "
-            "that)"
-        )
-    return Warned(note) if roofed < ROOFED else note
+        note += f", and rooms at the tops of their walls, at {ceiling:.2f} m (see --ceiling)"
+    return Warned(note) if roofless else note
 
 
 def assemble_cells(

@@ -119,7 +119,6 @@ ROOMS = {
         ),
         {"a": IN_A, "yard": (8, 1, 1.6), "b": (14, 2.5, 1.6)},
         sees=("a yard", "yard b", "a b"),
-        seen={(8, 1, 2.9): None},  # beside the roofs
         closed=False,
         notes=("open",),
     ),

@@ -3,6 +3,7 @@ docs/design/cells.md: a straight line that leaves a room above its walls enters 
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from ptmtools.arrays import Floats, normals
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
+from ptmtools.cells.doors import enclosure
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, Scene, ingest
@@ -17,7 +19,7 @@ from ptmtools.scene.orientation.space import to_world
 from ptmtools.visibility import check_conservative, compute_pvs
 from tests.cells.buildings import write
 from tests.cells.strangers import Parts, office, serpentine
-from tests.scene.buildings import box
+from tests.scene.buildings import box, house, meadow, sheet
 
 NONE = SubdivideOptions(ceiling="none")
 
@@ -150,6 +152,57 @@ def test_the_ceiling_is_stored(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         np.concatenate([cells.portal(k) for k in np.flatnonzero(cells.in_ceiling)])[:, 1], 4.2
     )
+
+
+def hall(holes: list[tuple[float, float, float, float]]) -> Floats:
+    """A hall of 12 × 12 m, 3 m high, whose floor is two triangles, with rectangular holes in its
+    ceiling."""
+    lines = [np.unique([0.0, 12.0, *(e for hole in holes for e in hole[k::2])]) for k in (0, 1)]
+    parts = [
+        sheet((0, 0, 0), (12, 0, 0), (12, 12, 0), (0, 12, 0)),
+        sheet((0, 0, 0), (0, 0, 3), (12, 0, 3), (12, 0, 0)),
+        sheet((0, 12, 0), (12, 12, 0), (12, 12, 3), (0, 12, 3)),
+        sheet((0, 0, 0), (0, 12, 0), (0, 12, 3), (0, 0, 3)),
+        sheet((12, 0, 0), (12, 0, 3), (12, 12, 3), (12, 12, 0)),
+    ]
+    for x0, x1 in pairwise(lines[0].tolist()):
+        for y0, y1 in pairwise(lines[1].tolist()):
+            if not any(a <= x0 and x1 <= c and b <= y0 and y1 <= d for a, b, c, d in holes):
+                parts.append(sheet((x0, y0, 3), (x0, y1, 3), (x1, y1, 3), (x1, y0, 3)))
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize(
+    ("building", "roofed"),
+    [
+        (hall([(3.5, 3.5, 4.5, 4.5), (7.5, 7.5, 8.5, 8.5)]), 1 - 2 / 144),  # over the middles
+        (hall([(0, 0, 7, 12), (9, 0, 12, 12)]), 2 / 12),
+        (meadow(house()), 1.0),
+        (meadow(house(roof=False)), 0.0),
+    ],
+    ids=["skylights", "a strip", "land around it", "land and no ceiling"],
+)
+def test_the_floor_is_measured_by_area(building: Floats, roofed: float, tmp_path: Path) -> None:
+    around = enclosure(scene_of_parts({"building": building}, tmp_path))
+    assert around.roofed == pytest.approx(roofed, abs=0.015)
+
+
+def test_two_skylights_are_no_open_top(tmp_path: Path) -> None:
+    holes = [(3.5, 3.5, 4.5, 4.5), (7.5, 7.5, 8.5, 8.5)]
+    cells = subdivide(scene_of_parts({"hall": hall(holes)}, tmp_path))
+    assert not any("open at the top" in note for note in cells.notes)
+
+
+def test_a_storey_without_a_ceiling_has_one_over_others_that_have(tmp_path: Path) -> None:
+    """Halls that are open above, on a storey of as much floor."""
+    raised = {name: part + [0, 0, 3] for name, part in serpentine(2).items()}
+    ground = house(16.9, 12.6, 2.8, roof=False) + [0, -0.3, 0]
+    scene = scene_of_parts({**raised, "ground": ground}, tmp_path)
+    cells = subdivide(scene)
+    assert cells.ceiling == pytest.approx(7.3)
+    a, b = cells.locate(middles(scene, [(4.3, 6, 4.6), (12.6, 6, 4.6)])).tolist()
+    assert a != b
+    assert any("open at the top" in note for note in cells.notes)
 
 
 def test_an_unknown_ceiling_is_an_error() -> None:
