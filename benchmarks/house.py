@@ -42,14 +42,14 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (69_035, 335),
+    "ptmtools": (69_395, 337),
     "ptmtools/*.py": (4_150, 26),
-    "ptmtools/cells": (8_014, 26),
+    "ptmtools/cells": (8_325, 28),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
     "ptmtools/light": (3_395, 15),
     "ptmtools/meshopt": (870, 5),
-    "ptmtools/output": (8_110, 39),
+    "ptmtools/output": (8_155, 39),
     "ptmtools/pipeline": (4_050, 20),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (2_040, 13),

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ptmtools.arrays import Floats, normals, sum_by_group
+from ptmtools.arrays import Bools, Floats, normals, sum_by_group
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.doors import Doors
 from ptmtools.cells.fabric import Fabric
@@ -41,6 +41,7 @@ from ptmtools.cells.structure import (
     spread_over,
     without_facets,
 )
+from ptmtools.cells.ways import floors_with_ways
 from ptmtools.executor import Executor
 from ptmtools.portal_flow.flow import Portals
 from ptmtools.scene.model import Scene
@@ -65,7 +66,7 @@ class Viewing:
     ) -> Viewing:
         """``middle``: height of the middle of a body; ``structure``: (n, 3, 3) triangles."""
         points, area = _thin(*spread(places.triangles(tolerance)))
-        beside = _points_beside(structure, 2 * tolerance.plane)
+        beside = points_beside(structure, 2 * tolerance.plane)
         return Viewing((points + [0.0, middle, 0.0], area), beside, tolerance)
 
     def cost(self, tree: Tree) -> float:
@@ -102,7 +103,7 @@ def _weight_by_leaf(tree: Tree, points: Floats, weight: Floats) -> Floats:
     return sum_by_group(leaf, weight, len(tree.leaves))
 
 
-def _points_beside(corners: Floats, distance: float) -> tuple[Floats, Floats]:
+def points_beside(corners: Floats, distance: float) -> tuple[Floats, Floats]:
     """Points spread over triangles, half of them at a distance to either side, and their m²."""
     facing = normals(corners)
     length = np.linalg.norm(facing, axis=1)
@@ -213,6 +214,19 @@ class Building:
         some = spread_over(points[inside], LOOKS)
         hollow = np.mean([not around.solid(point[None]) for point in some]) if len(some) else 0.0
         return bool(inside.mean() * hollow * size.sum() >= _ROOM)
+
+    @cached_property
+    def has_way(self) -> Bools:
+        """(r,) whether visitors stand in each region of the places: a way leads there from a
+        room."""
+        structure, tolerance = self.structure, self.structure.tolerance
+        if self.options.standing != "places" or not len(self.places.plan):
+            return np.ones(len(self.places.plan), dtype=np.bool_)
+        solid = structure.corners[~structure.door | (self.options.doors == "closed")]
+        around = Surroundings(solid, tolerance)
+        eyes = np.array([*self.options.viewpoints, *self.cameras.tolist()]).reshape(-1, 3)
+        rooms = self.volumes.rooms
+        return floors_with_ways(self.places, around, self.walker, tolerance, rooms, eyes)
 
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""

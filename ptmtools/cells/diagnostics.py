@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats
@@ -13,7 +14,7 @@ from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import DoorState
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.space import DividedSpace, UnreachedRoom
+from ptmtools.cells.space import LEAST_PLACE, DividedSpace, UnreachedRoom
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.quantities import count
@@ -86,6 +87,24 @@ def _door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list
             leaf = count(len(chosen), "door leaf", "door leaves")
             notes.append(f"{leaf} ({names}) {'is' if len(chosen) == 1 else 'are'} {state}")
     return notes
+
+
+def way_notes(building: Building) -> list[str]:
+    """The note on walkable floor to which no way leads, a warning if it is much."""
+    plan, lost = building.places.plan, ~building.has_way
+    area = shapely.area(plan)
+    if not area[lost].sum() >= LEAST_PLACE:
+        return []
+    largest = np.flatnonzero(lost)[area[lost].argmax()]
+    x, z = shapely.get_coordinates(shapely.point_on_surface(plan[largest]))[0].tolist()
+    a, b, c = building.places.slope[largest].tolist()
+    share = area[lost].sum() / area.sum()
+    note = (
+        f"{area[lost].sum():.1f} m² of walkable floor ({share:.0%}), such as "
+        f"{area[largest]:.1f} m² around {_triple((x, a * x + b * z + c, z))}, is drawn, but no way "
+        "leads there from a room, so visitors do not go there (--standing floors changes that)"
+    )
+    return [Warned(note) if share > MUCH else note]
 
 
 def viewpoint_notes(solid: Floats) -> list[str]:

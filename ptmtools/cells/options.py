@@ -10,7 +10,7 @@ from ptmtools.options import option, require
 
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
-Standing = Literal["places", "anywhere"]
+Standing = Literal["places", "floors", "anywhere"]
 CeilingKind = Literal["auto", "none"]
 SpacesKind = Literal["auto", "none"]
 DoorState = Literal["pass", "open", "closed", "hidden"]
@@ -114,8 +114,9 @@ class SubdivideOptions:
     )
     standing: Standing = option(
         "places",
-        "Possible positions of the eyes: above walkable floor, up to 1.3 times the height of "
-        "--walker (places), or anywhere in the cell, for flying cameras (anywhere).",
+        "Possible positions of the eyes: above walkable floor to which a way leads from a room, up "
+        "to 1.3 times the height of --walker (places), above any walkable floor, such as roofs and "
+        "plenums (floors), or anywhere in the cell, for flying cameras (anywhere).",
     )
     doors: DoorState = option(
         "pass",
@@ -162,7 +163,7 @@ class SubdivideOptions:
             (
                 self.standing in get_args(Standing),
                 f"unknown standing {self.standing!r}",
-                "places or anywhere",
+                "places, floors or anywhere",
             ),
             (
                 self.doors in get_args(DoorState),

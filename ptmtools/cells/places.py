@@ -294,6 +294,10 @@ class Places:
 
     def triangles(self, tolerance: Tolerance) -> Floats:
         """(n, 3, 3) triangles of the regions, on their slopes, metres."""
+        return self.triangles_by_region(tolerance)[0]
+
+    def triangles_by_region(self, tolerance: Tolerance) -> tuple[Floats, Ints]:
+        """The `triangles`, and (n,) the region of each."""
         parts, region = shapely.get_parts(self.plan, return_index=True)
         flat = shapely.get_dimensions(parts) == 2
         parts, region = parts[flat], region[flat]
@@ -308,9 +312,10 @@ class Places:
             undivided = shapely.is_empty(triangles)
             parts, which = halves(parts[undivided], tolerance.grid)
             region = region[undivided][which]
-        plan, slope = np.concatenate(corners), self.slope[np.concatenate(owner)]
+        plan, region = np.concatenate(corners), np.concatenate(owner)
+        slope = self.slope[region]
         height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
-        return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
+        return np.stack([plan[..., 0], height, plan[..., 1]], axis=2), region
 
 
 def find_places(

@@ -16,7 +16,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, sum_by_group
 from ptmtools.cells.bsp import SplitPlanes, Tree, build_tree
-from ptmtools.cells.building import Building
+from ptmtools.cells.building import Building, points_beside
 from ptmtools.cells.doors import THICK, open_doors
 from ptmtools.cells.floors import ceiling_plane
 from ptmtools.cells.model import descend
@@ -47,6 +47,12 @@ LEAST_PLACE = 0.05
 LEAST_INSIDE = 2.0
 #: Number of points from which the ones that test the walls are chosen.
 _CHOICE = 256
+#: The walled ground around a building, such as a garden, has up to this many times its floor.
+_GARDEN = 4.0
+#: A model of solids has less walled floor around them than this many times that inside of them.
+_PLATE = 0.5
+#: A void is hardly the building if less than this share of the model's surfaces bounds it.
+_HARDLY = 0.1
 
 
 @dataclass(frozen=True)
@@ -267,7 +273,7 @@ def _divide(building: Building, root: Polyhedron, progress: Progress, inside: bo
         start, solid = largest_leaf(tree, outer <= inside, structure, building.walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
-    if closed and solid and not inside and _stands_elsewhere(tree, reached, building):
+    if closed and not inside and _is_elsewhere(tree, portals, reached, outer, building, solid):
         closed, reached = False, np.zeros_like(reached)
     shut = np.zeros(len(building.doors.leaves), dtype=bool)
     space = DividedSpace(
@@ -290,16 +296,35 @@ def _divide(building: Building, root: Polyhedron, progress: Progress, inside: bo
     return space
 
 
-def _stands_elsewhere(tree: Tree, reached: Bools, building: Building) -> bool:
-    """Whether more floor is walkable between walls elsewhere than in the (L,) leaves ``reached``,
-    which may be the inside of a pillar."""
+def _is_elsewhere(
+    tree: Tree,
+    portals: list[Portal],
+    reached: Bools,
+    outer: Bools,
+    building: Building,
+    solid: bool,
+) -> bool:
+    """Whether the building is not in the (L,) leaves ``reached``, a void that the model closes, but
+    around it: visitors walk between walls, under the sky, on much more floor than there, or on half
+    as much if the void is a ``solid``; or that is hardly bounded by surfaces of the model.
+    ``outer``: (L,) which leaves are at the box."""
     structure = building.structure
-    there = Standing.from_tree(tree, ~reached, building)
-    walled = Surroundings(structure.corners, structure.tolerance).enclose(
-        there.points, roofed=False
-    )
-    reached_place = float(Standing.from_tree(tree, reached, building).place.sum())
-    return float(there.place[walled].sum()) > reached_place
+    around = Surroundings(structure.corners, structure.tolerance)
+    if not solid:
+        largest = rank(np.array([body.volume for body in tree.leaves]) * reached)[:LOOKS]
+        middle = [tree.leaves[leaf].points.mean(axis=0) for leaf in largest if reached[leaf]]
+        solid = around.solid(np.array(middle))
+    seeds = tuple(np.flatnonzero(outer).tolist())
+    outside = flood(len(tree.leaves), portals, seeds)
+    there = Standing.from_tree(tree, outside, building)
+    within = float(Standing.from_tree(tree, reached, building).place.sum())
+    some = spread_over(there.points, _CHOICE**2)
+    walled = around.enclose(some, roofed=False).mean() if len(some) else 0.0
+    if walled * there.place.sum() > (_PLATE if solid else _GARDEN) * within:
+        return True
+    points, area = points_beside(structure.corners, 2 * structure.tolerance.plane)
+    bound = float(area @ _locate_within(tree, reached, points)[0])
+    return solid and bound < _HARDLY * float(area.sum()) / 2
 
 
 def _complete(building: Building, space: DividedSpace, outer: Bools) -> DividedSpace:

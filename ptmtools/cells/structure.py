@@ -271,11 +271,22 @@ class Surroundings:
     def solid(self, points: Floats) -> bool:
         """Whether (n, 3) points are inside a solid: nearly all walls that level rays from them meet
         face away."""
-        along = np.tile(self._level, (len(points), 1))
-        hit = self._hits(np.repeat(points, _RAYS, axis=0), along)
-        away = np.einsum("sij,ij->si", self._front[hit], along) > 0
-        sure = (hit >= 0).all(axis=0) & (away[0] == away[1])
-        return bool(sure.any() and away[0, sure].mean() >= _AWAY)
+        return bool(self.solid_groups(points[None])[0])
+
+    def solid_groups(self, points: Floats) -> Bools:
+        """(g,) whether groups of points, (g, n, 3), are each inside a solid; see `solid`."""
+        sums = np.zeros((len(points), 2), dtype=np.int64)  # of walls that are sure, and face away
+        flat, group = points.reshape(-1, 3), np.repeat(np.arange(len(points)), points.shape[1])
+        for first in range(0, len(flat), _AT_ONCE):
+            some = flat[first : first + _AT_ONCE]
+            along = np.tile(self._level, (len(some), 1))
+            hit = self._hits(np.repeat(some, _RAYS, axis=0), along)
+            away = np.einsum("sij,ij->si", self._front[hit], along) > 0
+            sure = (hit >= 0).all(axis=0) & (away[0] == away[1])
+            counts = np.stack([sure, sure & away[0]]).reshape(2, -1, _RAYS).sum(axis=2)
+            np.add.at(sums, group[first : first + _AT_ONCE], counts.T)
+        result: Bools = (sums[:, 0] > 0) & (sums[:, 1] >= _AWAY * sums[:, 0])
+        return result
 
     def have_floor(self, points: Floats) -> Bools:
         """(n,) whether the surface straight below each of (n, 3) points faces up."""

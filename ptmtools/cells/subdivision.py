@@ -27,6 +27,7 @@ from ptmtools.cells.diagnostics import (
     triangle_notes,
     undecided_notes,
     viewpoint_notes,
+    way_notes,
 )
 from ptmtools.cells.doors import THICK
 from ptmtools.cells.fabric import matches
@@ -255,7 +256,7 @@ def _viewers(
     """(L,) which leaves stand, `Cells.eye_floor`, and notes; ``rename``: the new number of each
     leaf of the tree."""
     standing, eye_floor = _standing(building, bodies, space)
-    notes: list[str] = []
+    notes = way_notes(building)
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]
         notes.append(NO_PLACES)
@@ -290,7 +291,7 @@ def _standing(
     if building.options.standing == "anywhere":
         return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
     boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
-    places = building.places
+    places = building.places.only(building.has_way)
     places = places.only(places.find_near(boxes - [0, walker.middle, 0]))
     if space.ceiling is not None:
         places = places.without_tops(space.ceiling - tolerance.plane, walker.radius)

@@ -1,5 +1,7 @@
-"""Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at eye
-height, away from the walls, with the best view (`views`). A room that the model names has one only.
+"""Places to stand in the rooms of a scene, at eye height, away from the walls, with the best view
+(`views`): one in each of the rooms that the model names, then in spaces that a visitor would call
+rooms, then in courts, on open ground and in the rest (`room_kinds`); of each kind in those with the
+largest floors first. A room that the model names has one only.
 
 `FloorFinder` finds the floor below a point: the nearest upward-facing surface. The squares of a
 grid in plan list the floor triangles whose boxes they touch, so that a query looks at the triangles
@@ -14,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.room_kinds import space_kinds
+from ptmtools.cells.structure import Surroundings
 from ptmtools.output.model import Vector
 from ptmtools.output.storeys import area, leaf_section
 from ptmtools.output.views import Outlook
@@ -125,51 +129,63 @@ class Standpoint:
 
 @dataclass(frozen=True)
 class _Room:
-    """A standing leaf: the height of its floor, and its section at eye height."""
+    """A standing leaf: its rank, see `_ranks`, the height of its floor, and its section at eye
+    height."""
 
     leaf: int
+    rank: int
     floor: float
     section: NDArray[np.float64]
 
 
 def places(
-    cells: Cells, ground: FloorFinder, outlook: Outlook, avatar_size: Vector, count: int
+    scene: Scene,
+    cells: Cells,
+    ground: FloorFinder,
+    outlook: Outlook,
+    avatar_size: Vector,
+    count: int,
 ) -> list[Standpoint]:
-    """At most ``count`` places: first the best view among the largest rooms of a storey, then the
-    rooms with the largest floors."""
+    """At most ``count`` places: first the best view among the largest rooms of a storey that are
+    of the best rank, then the others by rank and by the size of their floors."""
     eye = avatar_size[1]
     rooms = []
-    for leaf in largest_leaves(cells, max(_LEAVES, _PER_ROOM * count)):
+    ranks = _ranks(scene, cells, ground, eye)
+    for leaf in largest_leaves(cells, max(_LEAVES, _PER_ROOM * count), ranks):
         floor = _floor(cells, leaf, ground)
         section = leaf_section(cells, leaf, floor + eye)
         if len(section) >= 3:
-            rooms.append(_Room(leaf, floor, section))
+            rooms.append(_Room(leaf, int(ranks[leaf]), floor, section))
     by_room: dict[int, Standpoint] = {}
     numbers = cells.room_numbers.tolist()
     begin: list[Standpoint] = []
-    least = 0.0
-    for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
+    best, least = 0, 0.0
+    for room in sorted(rooms, key=lambda room: (room.rank, -area(room.section), room.leaf)):
         number, size = numbers[cells.leaf_cell[room.leaf]], area(room.section)
-        if len(by_room) >= count and size < least:
+        as_good = not begin or (size >= least and room.rank == best)
+        if len(by_room) >= count and not as_good:
             break
         if number not in by_room:
             place = _place_in(room, cells, ground, outlook, avatar_size)
             if place is not None:
                 by_room[number] = place
-                least = least or _AS_LARGE * size
-                if size >= least and abs(place.floor - (begin or [place])[0].floor) < eye:
+                if not begin:
+                    best, least = room.rank, _AS_LARGE * size
+                if as_good and abs(place.floor - (begin or [place])[0].floor) < eye:
                     begin.append(place)
     first = max(begin, key=lambda place: place.worth, default=None)
     ordered = sorted(by_room.values(), key=lambda place: place is not first)
     return ordered[:count]
 
 
-def largest_leaves(cells: Cells, count: int) -> list[int]:
-    """At most ``count`` standing leaves by the volume of their boxes, a few of each cell."""
+def largest_leaves(cells: Cells, count: int, ranks: NDArray[np.int64] | None = None) -> list[int]:
+    """At most ``count`` standing leaves, those of a lower rank of (L,) ``ranks`` first, then by the
+    volume of their boxes, a few of each cell."""
     boxes = [np.ptp(cells.leaf_points(i), axis=0).prod() for i in range(cells.leaf_count)]
     taken = np.zeros(cells.cell_count, dtype=np.int64)
     leaves = []
-    for leaf in np.argsort(-np.array(boxes), kind="stable").tolist():
+    ranks = np.zeros(cells.leaf_count, dtype=np.int64) if ranks is None else ranks
+    for leaf in np.lexsort((-np.array(boxes), ranks)).tolist():
         cell = cells.leaf_cell[leaf]
         if cells.leaf_standing[leaf] and taken[cell] < _OF_A_CELL:
             taken[cell] += 1
@@ -177,6 +193,37 @@ def largest_leaves(cells: Cells, count: int) -> list[int]:
         if len(leaves) == count:
             break
     return leaves
+
+
+def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArray[np.int64]:
+    """(L,) the rank of each leaf: 0 of rooms with a name, else its `SpaceKind` and 1; that of
+    leaves in which nobody stands is meaningless."""
+    result = np.zeros(cells.leaf_count, dtype=np.int64)
+    named = np.array([bool(cells.room_name(cell)) for cell in range(cells.cell_count)] + [False])
+    leaves = np.flatnonzero(cells.leaf_standing & ~named[cells.leaf_cell])
+    if not len(leaves):
+        return result
+    points = np.stack([_look_points(cells.leaf_points(leaf)) for leaf in leaves.tolist()])
+    floor = ground.floor_below(points[:, 0])
+    low, high = (
+        np.array([fit(cells.leaf_points(leaf)[:, 1]) for leaf in leaves.tolist()])
+        for fit in (np.min, np.max)
+    )
+    fits = (floor + eye > low) & (floor + eye < high)
+    height = np.where(fits, eye, np.maximum(points[:, 0, 1] - floor, 0.0))
+    points[:, :, 1] = np.where(fits, floor + eye, points[:, 0, 1])[:, None]
+    around = Surroundings(scene.corners, scene.tolerance)
+    volume = cells.leaf_volumes()[leaves]
+    result[leaves] = 1 + space_kinds(around, points, height, volume)
+    return result
+
+
+def _look_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(5, 3) points in a convex body with these corners: its middle, and half the way from there to
+    its ends along x and z."""
+    middle = points.mean(axis=0)
+    ends = [points[pick(points[:, axis])] for axis in (0, 2) for pick in (np.argmin, np.argmax)]
+    return np.array([middle, *(middle + (np.array(ends) - middle) / 2)])
 
 
 def _floor(cells: Cells, leaf: int, ground: FloorFinder) -> float:

@@ -259,7 +259,8 @@ def _touring(
     numbers = cells.room_numbers.tolist()
     taken = {numbers[v.cell] for v in initial}
     count = max(options.viewpoint_count, not initial)
-    rooms = places(cells, ground, outlook, options.avatar(cells.walker), count + len(taken))
+    size = options.avatar(cells.walker)
+    rooms = places(scene, cells, ground, outlook, size, count + len(taken))
     rooms = [place for place in rooms if numbers[place.cell] not in taken][:count]
     if not rooms:
         return [] if initial else [_anywhere(cells, outlook, options)]

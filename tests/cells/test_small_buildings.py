@@ -19,21 +19,9 @@ from tests.cells.small_buildings import EMPTY, GAP_BEHIND_GAP, HEIGHTS, MODELS, 
 from tests.scene.buildings import house, inside_out, y_up
 
 EVERY = ROOMS | HEIGHTS | NO_PLACES | DOORS | MODELS
-#: Of which something else comes, so far, and why.
-WRONG = {
-    "a niche in a wall 80 cm thick": "the flood gets into the wall, where a body fits",
-}
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(
-            name, marks=pytest.mark.xfail(name in WRONG, reason=WRONG.get(name, ""), strict=True)
-        )
-        for name in EVERY
-    ],
-)
+@pytest.mark.parametrize("name", EVERY)
 def test_what_comes_of_it(name: str, tmp_path: Path) -> None:
     made = EVERY[name]
     scene = made.scene(tmp_path)

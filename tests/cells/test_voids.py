@@ -1,0 +1,60 @@
+"""A void that a model closes, such as a base plate or a thick wall, is not the building."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.arrays import Floats
+from ptmtools.cells import subdivide
+from ptmtools.scene import IngestOptions, ingest
+from ptmtools.scene.orientation.space import to_world
+from tests.cells.buildings import AXES, carved, room, write
+from tests.cells.strangers import Parts
+from tests.scene.buildings import box
+
+
+def walls_on_a_base(thickness: float) -> Parts:
+    """Four walls without thickness or roof, 3 m high, on a base plate of 8 × 8 m."""
+    around = np.asarray(box((0, 0, 0), (8, 8, 3)))[:, ::-1]
+    upright = np.ptp(around[:, :, 2], axis=1) > 0
+    return {"base": np.asarray(box((0, 0, -thickness), (8, 8, 0))), "walls": around[upright]}
+
+
+def court() -> Parts:
+    """A court of 18 × 18 m within walls 1 m thick and 4 m high, each a solid of its own."""
+    sides = ((0, 0, 20, 1), (0, 19, 20, 20), (0, 1, 1, 19), (19, 1, 20, 19))
+    return {"ground": np.asarray(box((0, 0, -0.1), (20, 20, 0)))} | {
+        f"wall_{k}": np.asarray(box((x0, y0, 0), (x1, y1, 4)))
+        for k, (x0, y0, x1, y1) in enumerate(sides)
+    }
+
+
+def house_in_a_garden() -> Parts:
+    """A closed house of 10 × 8 m in a walled garden of 16 × 14 m."""
+    wall: Floats = carved([room(-3, -3, 13, 11, 0, 5)], [room(-3, -3, 13, 11, 4, 6)])
+    return {"house": carved([room(0, 0, 10, 8, 0.2, 3)]), "garden": wall}
+
+
+@pytest.mark.parametrize(
+    ("parts", "closed", "inside"),
+    [
+        (walls_on_a_base(0.45), False, (4, 4, 1.5)),
+        (walls_on_a_base(0.6), False, (4, 4, 1.5)),
+        (walls_on_a_base(2.5), False, (4, 4, 1.5)),
+        (court(), False, (10, 10, 1.5)),
+        (house_in_a_garden(), True, (5, 4, 1.5)),
+    ],
+    ids=["plate", "thick plate", "podium", "court", "garden"],
+)
+def test_where_the_building_is(
+    parts: Parts, closed: bool, inside: tuple[float, float, float], tmp_path: Path
+) -> None:
+    scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
+    cells = subdivide(scene)
+    leaf = int(cells.locate_leaf(to_world(np.array([inside]), scene.space))[0])
+    assert cells.closed == closed
+    assert leaf >= 0
+    assert cells.leaf_standing[leaf]
