@@ -51,7 +51,12 @@ def bake(
     ----------
     faces: for each material its rows of ``uv``, (T, 3, 2).
     """
-    baked = [_merge_mask(material, store, notes) for material in materials]
+    textures = [material.texture for material in materials]
+    store.examine(filter(None, textures), workers, progress)
+    baked = [
+        _merge_mask(replace(material, texture=texture and store.convert(texture)), store, notes)
+        for material, texture in zip(materials, textures, strict=True)
+    ]
     copied = False
     for number, rows in enumerate(faces):
         texture = baked[number].texture
@@ -60,8 +65,7 @@ def bake(
             baked[number] = replace(baked[number], texture=texture)
             uv, copied = uv if copied else uv.copy(), True
             uv[rows] = coords
-    textures = (material.texture for material in baked)
-    store.examine((texture for texture in textures if texture is not None), workers, progress)
+    store.examine(filter(None, (material.texture for material in baked)), workers, progress)
     return _drop_alpha(baked, faces, uv, store), uv
 
 
@@ -130,7 +134,7 @@ def _merge_mask(material: SourceMaterial, store: ImageStore, notes: IngestNotes)
     mask, texture = material.mask, material.texture
     if mask is None:
         return material
-    without = replace(material, mask=None)
+    without, mask = replace(material, mask=None), store.convert(mask, mask.channel)
     opacities = store.record(mask, mask.channel)
     if opacities is None:  # an unreadable mask must not hide anything
         return replace(without, see_through=True)

@@ -36,6 +36,8 @@ from ptmtools.texture.model import Description, Limits
 if TYPE_CHECKING:
     from PIL import Image
 
+    from ptmtools.texture.images import Picture
+
 
 #: Names that Windows reserves for devices, with or without a suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
@@ -80,7 +82,8 @@ class VerifiedBytes:
 @dataclass(frozen=True)
 class ImageRecord:
     """Properties of an image: digest, Pillow's name of its format, whether it has an alpha channel,
-    and its transparent texels as bits packed along rows; or the reason why it cannot be decoded.
+    and its transparent texels as bits packed along rows; what has to be converted (`open_shallow`),
+    or the reason why it cannot be decoded.
     """
 
     sha256: str = ""
@@ -88,6 +91,7 @@ class ImageRecord:
     alpha: bool = False
     width: int = 0
     bits: _Bits | None = None
+    conversion: str = ""
     fault: str = ""
 
     @property
@@ -113,6 +117,7 @@ class ImageStore:
         self._files: list[set[str]] = []
         self._inputs: set[str] = set()
         self._stems: set[str] = set()
+        self._converted: set[str] = set()
 
     @property
     def images(self) -> tuple[SourceImage, ...]:
@@ -140,6 +145,18 @@ class ImageStore:
                 progress(done, len(pending), "images")
                 self._examined[read, None] = record
         progress(len(pending), len(pending), "images")
+
+    def convert(self, texture: SourceTexture, channel: str | None = None) -> SourceTexture:
+        """A texture, or a mask with a ``channel``, whose image has 8 bits a component if it can be
+        decoded; a miss if that converts it."""
+        record = self._record(texture, channel)
+        if not record.conversion:
+            return texture
+        if record.sha256 not in self._converted:
+            self._converted.add(record.sha256)
+            self._notes.miss("PTM-N126", f"{texture.what}: {record.conversion}", texture.place)
+        self.mark_as_input(texture)
+        return replace(texture, read=ConvertedBytes(texture.read, self.limit))
 
     def add(self, texture: SourceTexture) -> tuple[int, NDArray[np.bool_] | None] | None:
         """The number of a texture's image, and its `ImageRecord.holes`; None, and a miss, if it
@@ -173,13 +190,17 @@ class ImageStore:
     def record(self, texture: SourceTexture, channel: str | None = None) -> ImageRecord | None:
         """The properties of an image, or with a ``channel`` (`SourceTexture`) those of a mask;
         None, and a miss, if it cannot be decoded."""
+        record = self._record(texture, channel)
+        if record.fault:
+            self._notes.miss("PTM-N206", f"{texture.what}: {record.fault}", texture.place)
+            return None
+        return record
+
+    def _record(self, texture: SourceTexture, channel: str | None) -> ImageRecord:
         key = texture.read, channel
         if key not in self._examined:
             with warnings.catch_warnings(action="ignore"):
                 self._examined[key] = _examine(texture, self.limit, channel)
-        if fault := self._examined[key].fault:
-            self._notes.miss("PTM-N206", f"{texture.what}: {fault}", texture.place)
-            return None
         return self._examined[key]
 
     def _name(self, label: str, kind: str) -> str:
@@ -209,7 +230,7 @@ def _examine(texture: SourceTexture, limit: int, channel: str | None = None) -> 
     try:
         with naming(texture.label, place=texture.place):
             data = read_within(texture, limit)
-            opened = _decode(data, limit)
+            opened, conversion = _decode(data, limit)
             with pillow_faults():
                 bits = _holes(opened, channel)
     except LimitError:
@@ -224,6 +245,7 @@ def _examine(texture: SourceTexture, limit: int, channel: str | None = None) -> 
         opened.has_transparency_data,
         opened.width,
         bits,
+        conversion,
     )
 
 
@@ -237,18 +259,24 @@ def read_within(texture: SourceTexture, limit: int) -> bytes:
 def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
     """(h, w, c) texels of 8 or 16 bits and the description of an image, to derive another from it.
 
-    ``limit`` as in `ImageStore`. Raises InputError if the image cannot be decoded or has other
-    samples, LimitError PTM-L104.
+    ``limit`` as in `ImageStore`. Raises InputError if the image cannot be decoded, LimitError
+    PTM-L104.
     """
-    from ptmtools.texture.images.files import load_image
+    picture = _open(data, limit, deep=True)[1]()
+    return picture.array(), picture.description
 
-    try:
-        picture = load_image(data, Limits(limit))
-    except MissingComponentError as error:
-        raise InputError(error.code, error.message) from None
-    if picture.texels.dtype.kind != "u":
-        raise InputError("PTM-I126", "images of floats cannot be combined or converted")
-    return picture.texels[0 : picture.texels.shape[0]], picture.description
+
+@dataclass(frozen=True)
+class ConvertedBytes:
+    """The bytes of a PNG of 8 bits of any image; ``limit`` and errors as of `integers`."""
+
+    read: Callable[[], bytes]
+    limit: int
+
+    def __call__(self) -> bytes:
+        from ptmtools.texture.images.png import png_bytes
+
+        return png_bytes(_open(self.read(), self.limit)[1]().array())
 
 
 class OptionalImages:
@@ -309,26 +337,44 @@ def is_plain(data: bytes, name: str, limit: int) -> bool:
     """
     try:
         with warnings.catch_warnings(action="ignore"):
-            opened = _decode(data, limit)
+            opened, conversion = _decode(data, limit)
     except LimitError:
         raise
     except InputError:
         return False
-    return not opened.has_transparency_data and name.endswith(f".{_suffix(opened.format or '')}")
+    plain = not (conversion or opened.has_transparency_data)
+    return plain and name.endswith(f".{_suffix(opened.format or '')}")
 
 
-def _decode(data: bytes, limit: int) -> Image.Image:
-    """Raises InputError if the image cannot be decoded, LimitError PTM-L104."""
+def _open(data: bytes, limit: int, *, deep: bool = False) -> tuple[str, Callable[[], Picture]]:
+    """As `open_shallow`; an image that needs a library that is not installed cannot be decoded."""
+    from ptmtools.texture.images import open_shallow
+
+    try:
+        return open_shallow(data, Limits(limit), deep=deep)
+    except MissingComponentError as error:
+        raise InputError(error.code, f"{error.message}: {error.remedy}") from None
+
+
+def _decode(data: bytes, limit: int) -> tuple[Image.Image, str]:
+    """An image in 8 bits, and what has to be converted (`open_shallow`).
+
+    Raises InputError if the image cannot be decoded, LimitError PTM-L104.
+    """
+    from PIL.Image import fromarray
+
     from ptmtools.texture.images.opening import load, open_image, pillow_faults
 
-    if not data:
-        raise InputError("PTM-I125", "empty file")
+    conversion, read = _open(data, limit)
+    if conversion:
+        texels = read().array()
+        return fromarray(texels[..., 0] if texels.shape[2] == 1 else texels), conversion
     limits = Limits(limit)
     with pillow_faults():
         image = open_image(cast("BinaryIO", io.BytesIO(data)), limits)
         check_size(*image.size, 4, limits)
         load(image)
-    return image
+    return image, ""
 
 
 def _suffix(kind: str) -> str:
@@ -347,10 +393,6 @@ def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
         return None
 
     def transparent(strip: Image.Image) -> NDArray[np.bool_]:
-        if opened.mode.startswith("I"):  # 16 bits, which convert() would clip
-            texels = np.asarray(strip)
-            # The only alpha in this mode is one transparent value.
-            return texels == opened.info["transparency"] if band == "A" else texels < 65535
         return np.asarray(strip.convert(mode).getchannel(band)) < 255
 
     width, height = opened.size

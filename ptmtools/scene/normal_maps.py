@@ -113,8 +113,7 @@ class NormalMaps:
         """The image of normals, and the scale of these."""
         if height:  # whose kind depends on its texels
             self._store.mark_as_input(use)
-        record = self._store.record(use)
-        if record is None:
+        if self._store.record(use) is None:
             return None, scale
         if height:
             kind = self._kind(use)
@@ -126,7 +125,8 @@ class NormalMaps:
                 self._note(use, "neither heights nor normals, left out")
                 return None, scale
             self._note(use, "holds normals, used as a normal map")
-        if record.alpha:
+        use = self._store.convert(use)
+        if (record := self._store.record(use)) and record.alpha:
             self._store.mark_as_input(use)
             return replace(use, read=OpaqueBytes(use.read, self._store.limit)), scale
         return use, scale

@@ -31,10 +31,13 @@ WARNINGS = (
     "PTM-N205",
     "PTM-N206",
     "PTM-N207",
+    "PTM-N126",
     "PTM-N210",
     "PTM-N253",
     "PTM-N244",
 )
+#: Warnings of which each is printed: what was converted differs from image to image.
+EACH = ("PTM-N126",)
 #: The second best up axis: not a warning, but printed without ``-v``.
 RUNNER_UP = "PTM-N238"
 #: Inside out, and rooms of impossible size: irrelevant for models that are viewed from outside,
@@ -134,14 +137,14 @@ class IngestNotes:
         return tuple(Note(*key, count) for key, count in self._notes.items())
 
     def enforce(self) -> None:
-        """Raises InputError for the first miss, with the number of the others."""
+        """Raises InputError for the first miss, and names all others."""
         if not self._misses:
             return
-        code, message, place = next(iter(self._misses))
-        more = len(self._misses) - 1
+        (code, message, place), *others = self._misses
+        lines = [line(Note(*miss)) for miss in others]
         raise InputError(
             code.replace("-N", "-I"),
-            message + (f" (and {more} more findings)" if more else ""),
+            "; ".join((message, *lines)),
             file=self.model,
             place=place or None,
             remedy="correct the model, or build without --strict",
@@ -162,10 +165,10 @@ def line(note: Note, more: int = 0) -> str:
 
 
 def warnings(notes: Iterable[Note]) -> Iterator[str]:
-    """The text of the warnings among some notes, one line for each code."""
+    """The text of the warnings among some notes, one line for each code but those of `EACH`."""
     by_code: dict[str, list[Note]] = {}
     for note in notes:
         by_code.setdefault(note.code, []).append(note)
     for code in WARNINGS:
-        if code in by_code:
-            yield line(by_code[code][0], len(by_code[code]) - 1)
+        for note in by_code.get(code, ()) if code in EACH else by_code.get(code, ())[:1]:
+            yield line(note, 0 if code in EACH else len(by_code[code]) - 1)

@@ -118,5 +118,16 @@ def in_eight_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
         return samples
     if samples.dtype == np.uint16:
         return (samples >> 8).astype(np.uint8)
+    return round_to_eight_bits(samples)
+
+
+def round_to_eight_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
+    """Samples of any kind as the nearest of 256 values: integers by their range, floats from 0 to
+    1."""
+    import numpy as np
+
+    if samples.dtype.kind == "u":
+        largest = np.iinfo(samples.dtype).max
+        return ((samples.astype(np.uint32) * 255 + largest // 2) // largest).astype(np.uint8)
     finite = np.nan_to_num(samples.astype(np.float32))
     return np.rint(np.clip(finite, 0, 1) * 255).astype(np.uint8)

@@ -223,7 +223,7 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
         7,
         "L104",
     ),
-    "texture of 16 bits": (deep_png("model/floor.png"), BUILD, 3, "I126"),
+    "texture of 16 bits": (deep_png("model/floor.png"), BUILD + " --strict", 3, "I126"),
     "unknown unit": (nothing, BUILD + " --unit cubit", 3, "I"),
     "impossible unit": (nothing, BUILD + " --unit 0", 3, "I"),
     "unit that makes it a planet": (nothing, BUILD + " --unit 1e12", 7, "L204"),

@@ -53,29 +53,22 @@ def test_a_mask_times_the_images_own_alpha(textured: Textured) -> None:
     assert actual[..., 3].tolist() == [[0, 128], [0, 51]]
 
 
-def test_of_16_bits_nothing_is_lost(textured: Textured) -> None:
+def test_floats_and_16_bits_become_8_before_they_are_combined(textured: Textured) -> None:
     deep = np.array([[1000, 65535], [300, 7]], np.uint16)
-    files = {"wall.png": png(deep), "m.png": png(MASK)}
+    floats = tiff(np.array([[0, 1], [1, 0.2]], np.float32))
+    scene = ingest(
+        textured("map_Kd wall.png\nmap_d m.tif", {"wall.png": png(deep), "m.tif": floats})
+    )
+    assert texels(scene).tolist() == [[[4, 0], [255, 255]], [[1, 255], [0, 51]]]
+    notes = [note.message.split(": ")[0] for note in scene.notes if note.code == "PTM-N126"]
+    assert notes == ["map_Kd wall.png", "map_d m.tif"]
+
+
+def test_a_damaged_mask_costs_the_mask_only(textured: Textured) -> None:
+    files = {"wall.png": png(noise(1, 2)), "m.png": png(MASK)[:-9]}
     scene = ingest(textured("map_Kd wall.png\nmap_d m.png", files))
-    from ptmtools.texture.images.files import load_image
-
-    made = load_image(scene.images[0].load()).texels[0:2]
-    assert made[..., 0].tolist() == deep.tolist()
-    assert made[..., 1].tolist() == [[0, 65535], [65535, 13107]]
-
-
-@pytest.mark.parametrize("name", ["the image", "the mask"])
-def test_what_cannot_be_baked_costs_the_mask_only(textured: Textured, name: str) -> None:
-    """Floats beside opacities; a mask in CMYK."""
-    floats = tiff(np.linspace(0, 1, 4, dtype=np.float32).reshape(2, 2))
-    stream = io.BytesIO()
-    Image.new("CMYK", (2, 2), (9, 9, 9, 9)).save(stream, "jpeg")
-    files = {"wall.tif": floats, "m.png": png(MASK)}
-    if name == "the mask":
-        files = {"wall.tif": tiff(noise(1, 2)), "m.png": stream.getvalue()}
-    scene = ingest(textured("map_Kd wall.tif\nmap_d m.png", files))
     assert scene.materials[0].image == 0
-    assert scene.images[0].load() == files["wall.tif"]
+    assert scene.images[0].load() == files["wall.png"]
     assert scene.materials[0].transparent
     (note,) = [note for note in scene.notes if note.code == "PTM-N206"]
     assert note.message.startswith("map_d m.png: ")
@@ -157,14 +150,7 @@ def test_what_would_be_too_large_repeats(put: Put) -> None:
     assert {note.code for note in findings.entries} == {"PTM-N206"}
 
 
-def test_what_could_not_be_made_may_be_when_the_file_changes(textured: Textured) -> None:
-    """So an image of which another was to be made is not plain, either."""
-    floats = tiff(np.linspace(0, 1, 4, dtype=np.float32).reshape(2, 2))
-    scene = ingest(textured("map_Kd w.tif\nmap_d m.png", {"w.tif": floats, "m.png": png(MASK)}))
-    assert [image.plain for image in scene.images] == [False]
-
-
-def test_floats_are_not_mirrored(put: Put) -> None:
+def test_floats_are_mirrored_in_8_bits(put: Put) -> None:
     from tests.scene.conftest import GltfModel
     from tests.scene.features.gltf import repeating
 
@@ -175,9 +161,10 @@ def test_floats_are_not_mirrored(put: Put) -> None:
         doc.view(tiff(np.linspace(0, 1, 4, dtype=np.float32).reshape(2, 2)))
     ]
     scene = ingest(put("a.glb", doc.glb()))
+    rows = [[0, 85], [170, 255]]
     assert scene.materials[0].wrap_s == "repeat"
-    (note,) = [note for note in scene.notes if note.code == "PTM-N206"]
-    assert "floats" in note.message
+    assert texels(scene).tolist() == [row + row[::-1] for row in rows + rows[::-1]]
+    assert "PTM-N126" in {note.code for note in scene.notes}
 
 
 def test_ktx2_without_its_library(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.errors import DatabaseError, naming
+from ptmtools.errors import DatabaseError
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.stage import Counts, SceneOrigin, Stage, changes_of
@@ -177,24 +177,19 @@ def _bytes(model: Path, names: Iterable[str], images: Iterable[SourceImage]) -> 
 
 def _put_images(
     run: Run,
-    options: IngestOptions,
     transaction: Transaction,
     images: Iterable[SourceImage],
     fresh: Iterable[SourceImage],
     before: Iterable[Mapping[str, Any]] = (),
 ) -> None:
-    """Stages the list of images, and a copy of each fresh one, which must be decodable; the
-    others are in the list ``before``."""
+    """Stages the list of images, and a copy of each fresh one; the others are in the list
+    ``before``."""
     from ptmtools.parallel import map_in_order
-    from ptmtools.texture.images import check_image
-    from ptmtools.texture.model import Limits
 
     images, fresh = tuple(images), tuple(fresh)
 
     def put(image: SourceImage) -> int:
         data = image.load()
-        with naming(image.name):
-            check_image(data, Limits(options.limit << 20))
         transaction.put(f"{IMAGES}/{image.sha256}", data, image.sha256)
         return len(data)
 
@@ -222,8 +217,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 16
-    changed = "images of emission of USD light and are shown; glass says what it transmits"
+    recipe = 17
+    changed = "images are converted to 8 bits and to RGB where necessary"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True
@@ -237,7 +232,7 @@ class SceneStage(Stage["Scene"]):
     def make(
         self, run: Run, options: IngestOptions, transaction: Transaction, work: StageRecord
     ) -> StageRecord:
-        """Raises the errors of `ingest` and `check_image`."""
+        """Raises the errors of `ingest`."""
         repainted = self._repaint(run, options, transaction, work)
         return repainted or self._read(run, options, transaction, work)
 
@@ -254,7 +249,7 @@ class SceneStage(Stage["Scene"]):
         if scene.lights:
             transaction.put_arrays(LIGHTS, scene.lights.to_arrays())
         run.cache(arrays_of(LIGHTS), scene.lights or None)
-        _put_images(run, options, transaction, scene.images, scene.images)
+        _put_images(run, transaction, scene.images, scene.images)
         return replace(
             work,
             inputs=_digests(model, scene.files, run.db.digests),
@@ -291,7 +286,7 @@ class SceneStage(Stage["Scene"]):
         if not transaction.keep(kept):
             return None
         images = [fresh.get(i, image) for i, image in enumerate(images_of(run))]
-        _put_images(run, options, transaction, images, fresh.values(), rows)
+        _put_images(run, transaction, images, fresh.values(), rows)
         counts = {**before.counts, **_bytes(model, work.inputs, images)}
         return replace(work, counts=counts, notes=before.notes, warnings=before.warnings)
 

@@ -1,10 +1,10 @@
 """Reading and writing image files without ever changing a texel silently.
 
 Nothing is scaled, rounded or converted on the way: texels that a format or a `.ptm` cannot hold
-exactly are an error. Colour and orientation are *kept*, not applied: texels are numbers, in the
-order of the file's rows, and the file's description of them goes into a
-`ptmtools.texture.Description`. The exception is TIFF, whose orientation says how its rows are
-stored; it is applied.
+exactly are an error, except for `open_shallow`, which says what it converts. Colour and orientation
+are *kept*, not applied: texels are numbers, in the order of the file's rows, and the file's
+description of them goes into a `ptmtools.texture.Description`. The exception is TIFF, whose
+orientation says how its rows are stored; it is applied.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from __future__ import annotations
 from ptmtools.texture.images.files import (
     SUFFIXES,
     WRITTEN,
-    check_image,
     load_image,
+    open_shallow,
     read_image,
     read_ptm,
     write_image,
@@ -26,8 +26,8 @@ __all__ = [
     "SUFFIXES",
     "WRITTEN",
     "Picture",
-    "check_image",
     "load_image",
+    "open_shallow",
     "png_bytes",
     "read_image",
     "read_ptm",

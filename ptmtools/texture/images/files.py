@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import PurePath
 from typing import IO, Any, BinaryIO, cast
@@ -23,6 +24,7 @@ from ptmtools.texture.images.opening import PNG, TIFF, pillow_faults
 from ptmtools.texture.images.picture import Picture, samples_error
 from ptmtools.texture.images.png import check_chunks, save_png
 from ptmtools.texture.model import Description, Limits
+from ptmtools.texture.samples import round_to_eight_bits
 from ptmtools.texture.sources import open_file
 
 #: Suffixes of the files that count as images when a folder is given.
@@ -81,13 +83,37 @@ def read_image(
         return picture.array()
 
 
-def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
-    """Raises what `read_image` would raise, without unpacking texels: for an image that Pillow has
-    decoded already."""
+def open_shallow(
+    source: bytes, limits: Limits = _LIMITS, *, deep: bool = False
+) -> tuple[str, Callable[[], Picture]]:
+    """What has to be converted to read an image of any samples, colours and frames in 8 bits, "" if
+    nothing; and a function that reads it so. ``deep``: 16 bits need not be converted either.
+
+    Raises what `load_image` raises; PTM-I126 only for what Pillow does not read either.
+    """
     file = cast("BinaryIO", io.BytesIO(source))
-    opened = _open(file, None, limits)
-    if isinstance(opened, Picture):
-        check_depth(opened)
+    picture: Picture | None = None
+    try:
+        opened = _open(file, None, limits)
+        if not isinstance(opened, Picture):
+            return "", partial(_unpack, opened)
+        picture = opened
+        if not (deep and picture.texels.dtype.name == "uint16"):
+            check_depth(picture)
+        return "", lambda: opened
+    except InputError as fault:
+        if fault.code != "PTM-I126":
+            raise
+        what = fault.message.partition(";")[0]
+    if picture is not None:
+        texels = round_to_eight_bits(picture.array())
+        return f"{what}, converted to 8 bits", lambda: replace(picture, texels=texels)
+    with pillow_faults():
+        image = opening.open_image(file, limits)
+        how, texels = opening.convert_texels(image, limits)
+        lossy = opening.lossy_format(file, image)
+        result = Picture(texels, lossy=lossy)
+    return f"{what}, {how}", lambda: result
 
 
 def check_depth(picture: Picture) -> None:
@@ -114,10 +140,12 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     result = _open(file, path, limits)
-    if isinstance(result, Picture):
-        return result
+    return result if isinstance(result, Picture) else _unpack(result)
+
+
+def _unpack(unpacked: Callable[[], Picture]) -> Picture:
     with pillow_faults():
-        return result()
+        return unpacked()
 
 
 def _open(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:

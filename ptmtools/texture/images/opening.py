@@ -10,6 +10,7 @@ only, so that an image of 16,384² RGB takes 1.3 times its raw size.
 
 from __future__ import annotations
 
+import io
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -191,6 +192,43 @@ def check(image: ImageFile, limits: Limits) -> None:
     if image.mode not in _COMPONENTS:
         raise samples_error(f"the colour model {image.mode}")
     check_size(*image.size, _COMPONENTS[image.mode], limits)
+
+
+def convert_texels(image: ImageFile, limits: Limits) -> tuple[str, NDArray[np.uint8]]:
+    """How the first frame of an opened image becomes grey or RGB of 8 bits, and these texels.
+
+    Inks become colours by the profile in the file, or as browsers mix them without one. Raises what
+    Pillow raises, InputError PTM-I126 for what it does not convert, LimitError PTM-L104.
+    """
+    check_size(*image.size, 4, limits)
+    load(image)
+    how, mode = "scaled to 8 bits", image.mode
+    if getattr(image, "is_animated", False):
+        how = "of which the first is used"
+    if mode == "F" or mode.startswith("I"):
+        raise samples_error(f"samples of mode {mode}")
+    if mode == "P":
+        mode = "RGBA" if image.has_transparency_data else "RGB"
+    elif mode not in _COMPONENTS:
+        how, mode = "converted to 8-bit RGB", {"La": "LA", "RGBa": "RGBA"}.get(mode, "RGB")
+    shown: Image | None = None
+    if image.mode in ("CMYK", "LAB"):
+        shown = _manage_colours(image)
+        how += " by its colour profile" if shown and image.mode == "CMYK" else ""
+    return how, _texels(_COMPONENTS[mode], shown or image.convert(mode))
+
+
+def _manage_colours(image: Image) -> Image | None:
+    """RGB by the profile of an image, or from CIE L*a*b*; None without a profile that works."""
+    from PIL import ImageCms
+
+    profile = io.BytesIO(image.info.get("icc_profile") or b"")
+    try:
+        source = ImageCms.createProfile("LAB") if image.mode == "LAB" else profile
+        srgb = ImageCms.createProfile("sRGB")
+        return ImageCms.profileToProfile(image, source, srgb, outputMode="RGB")
+    except (ImageCms.PyCMSError, ImportError, OSError):
+        return None
 
 
 def read(image: ImageFile, depth: int, lossy: str | None) -> Picture:
