@@ -93,7 +93,7 @@ def encoded_file(coding: FileCoding, job: FileJob, threads: int = 1) -> Report:
         data = standard_input() if source == STANDARD else source
         picture = load_image(data, batch.limits)
         report["image_bytes"] = len(data) if isinstance(data, bytes) else os.path.getsize(data)
-        report["lossy"] = picture.lossy
+        report["lossy"] = picture.lossy and picture.lossy.format
         if coding.orient and picture.description.orientation != 1:
             picture = replace(picture.upright(), lossy=None)
         encoded = None

@@ -23,8 +23,10 @@ from __future__ import annotations
 
 import io
 import math
+from bisect import bisect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ptmtools.errors import InputError, MissingComponentError
@@ -42,6 +44,8 @@ if TYPE_CHECKING:
 FIRST_SIDE = 64
 #: By how much the quality of previews below the finest is lower, and the lowest quality.
 LADDER, LOWEST = 25, 10
+#: Qualities of previews that stand for a lossy image of as many bytes.
+FITTED = range(50, 96, 5)
 #: A preview of more than this share of the exact bytes up to its level is not worth its file.
 WORTH = 0.5
 #: Bytes of a texture beside a lossy source that is its own exact form, as a share of the source;
@@ -107,8 +111,9 @@ class PreviewOptions:
     exact: Exact = option(
         "lossless-sources",
         "Textures with lossless levels: always all of them; lossless-sources those whose images "
-        "are lossless, while a JPEG, lossy WebP or AVIF is sent as it is; never none, and the "
-        "finest preview is the finest level.",
+        "are lossless, while a JPEG, lossy WebP or AVIF is sent as it is, or as a preview of as "
+        "many bytes if browsers do not read it; never none, and the finest preview is the finest "
+        "level.",
         basic=True,
     )
 
@@ -223,6 +228,13 @@ class Pyramid:
         )
         data = image_bytes(texels, name, quality)
         return self.measure(level, data, name), data
+
+    def fit_preview(self, level: int, size: int, wanted: str) -> tuple[Preview, bytes]:
+        """As `preview`, of the highest of `FITTED` whose file has at most ``size`` bytes, or of the
+        lowest."""
+        encode = cache(lambda quality: self.preview(level, quality, wanted))
+        place = bisect(FITTED, size, key=lambda quality: encode(quality)[0].bytes)
+        return encode(FITTED[max(0, place - 1)])
 
     def measure(self, level: int, data: bytes, name: str) -> Preview:
         """The preview that a file is of a level."""

@@ -2,6 +2,8 @@
 
 A *source that is its own exact form*, a JPEG, lossy WebP or AVIF, keeps its bytes; its `.ptm` has
 only the coarsest levels, and previews of the levels between fill the rest of a tenth of its bytes.
+A lossy source that browsers do not read, or that was converted, has a preview of as many bytes
+instead: exact levels would repeat its losses in four times the bytes.
 """
 
 from __future__ import annotations
@@ -78,7 +80,6 @@ class _StepsEncoder:
         threads: int,
     ) -> None:
         from ptmtools.texture.encoder import kept_levels
-        from ptmtools.texture.images.bare import bare
         from ptmtools.texture.pyramid import build_pyramid, level_sizes
         from ptmtools.texture.samples import in_eight_bits
 
@@ -91,19 +92,18 @@ class _StepsEncoder:
         #: Numbers in the complete pyramid of the kept levels, and of those that are always exact.
         self._kept = kept
         self._coarse = kept[: coarse_levels([max(sizes[n]) for n in kept])]
-        format = SOURCES.get(picture.lossy or "")
-        is_exact = previews.exact != "always" and kept[-1] == len(sizes) - 1
-        is_exact &= len(self._coarse) < len(kept)
-        self._format = format if is_exact else None
-        self._source = bare(source, picture.lossy or "") if self._format else b""
+        is_whole = kept[-1] == len(sizes) - 1 and len(self._coarse) < len(kept)
+        #: The finest level of a lossy source, which then has no exact levels but the coarse ones.
+        self._finest = self._lossy_level(source) if is_whole else None
 
     def encode_all(self) -> EncodedSteps:
         """See `encode_steps`."""
         from ptmtools.texture.container import read_header
 
         never = self._previews.exact == "never" and len(self._coarse) < len(self._kept)
-        if self._format or never:
-            data, _ = self._ptm(self._coarse[-1], BESIDE * COARSE_PART * len(self._source))
+        if self._finest or never:
+            size = self._finest[0].bytes if self._finest else 0
+            data, _ = self._ptm(self._coarse[-1], BESIDE * COARSE_PART * size)
             detail = self._pyramid.detail
         else:
             data, detail = self._ptm(self._kept[-1])
@@ -115,6 +115,21 @@ class _StepsEncoder:
             Steps(detail, self._pyramid.errors, levels, previews),
             tuple(file for _, file in steps),
         )
+
+    def _lossy_level(self, source: bytes) -> tuple[Preview, bytes] | None:
+        """The finest level as the file of a lossy source or as a preview of as many bytes; None for
+        one that shall have exact levels, or the finest preview of all sources."""
+        from ptmtools.texture.images.bare import bare
+
+        lossy, options, level = self._picture.lossy, self._previews, len(self._kept) - 1
+        if lossy is None or options.exact == "always":
+            return None
+        if format := SOURCES.get(lossy.format):
+            data = bare(source, lossy.format)
+            return self._pyramid.source(data, format), data
+        if options.exact == "never" or not options.preview:
+            return None
+        return self._pyramid.fit_preview(level, lossy.bytes, options.preview_format)
 
     def _ptm(self, last: int, limit: float = 0) -> tuple[bytes, Detail]:
         """The `.ptm` with the kept levels up to ``last``, with fewer if it has more than ``limit``
@@ -147,11 +162,11 @@ class _StepsEncoder:
 
         count, pyramid, options = len(self._kept), self._pyramid, self._previews
         beyond = dict.fromkeys(range(levels, count), sys.maxsize)
-        if self._format:
-            source = [(pyramid.source(self._source, self._format), self._source)]
+        if self._finest:
             del beyond[count - 1]
-            room = BESIDE * len(self._source) - len(data)
-            return [*(pyramid.ladder(options, beyond, room) if options.preview else []), *source]
+            room = BESIDE * self._finest[0].bytes - len(data)
+            ladder = pyramid.ladder(options, beyond, room) if options.preview else []
+            return [*ladder, self._finest]
         if not options.preview:
             return []
         ends = [level.end for level in read_header(data).levels]

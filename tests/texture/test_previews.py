@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ from PIL import Image
 
 from ptmtools.errors import InputError
 from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, load_image, read_header
-from ptmtools.texture.images import Picture
-from ptmtools.texture.images.bare import bare
+from ptmtools.texture.images import Picture, png_bytes
+from ptmtools.texture.images.bare import bare, drop_alpha
+from ptmtools.texture.images.picture import check_jpeg
 from ptmtools.texture.previews import (
     BESIDE,
     FIRST_SIDE,
+    FITTED,
     WORTH,
     PreviewOptions,
     Pyramid,
@@ -141,6 +144,62 @@ def test_a_lossless_copy_of_a_lossy_source_on_request(options: dict[str, object]
     assert np.array_equal([*decode_levels(encoded.ptm)][-1], load_image(source).array())
     assert not any(preview.exact for preview in encoded.steps.previews)
     assert bool(encoded.steps.previews) == ("preview" not in options)
+
+
+@pytest.mark.parametrize("components", [1, 3, 4])
+@pytest.mark.parametrize("share", [0.01, 1, 100])
+def test_texels_of_a_lossy_source_that_is_not_sent_have_a_preview_of_as_many_bytes(
+    components: int, share: float
+) -> None:
+    """A PNG of them remembers the bytes."""
+    kind = "WEBP" if components == 4 else "JPEG"
+    original = photograph(256, 256, components)
+    lossy = saved(original, kind, quality=80)
+    texels, size = load_image(lossy).array(), int(share * len(lossy))
+    encoded = steps_of(png_bytes(texels, lossy=size))
+    *between, finest = encoded.steps.previews
+    assert (finest.width, finest.height, finest.exact) == (256, 256, False)
+    if share == 1:
+        assert 0.8 * size < finest.bytes <= size
+        # Less than the source has lost already.
+        apart = texels[..., :3].astype(float) - original[..., :3]
+        assert finest.error < math.sqrt(np.square(apart).mean())
+    qualities = {0.01: FITTED[0], 100: FITTED[-1]}
+    if quality := qualities.get(share):
+        same = saved(texels, "WEBP", quality=quality, exact=True)
+        assert encoded.previews[-1] == same or components == 1
+    assert len(encoded.ptm) + sum(preview.bytes for preview in between) <= BESIDE * finest.bytes
+    for options in ({"exact": "always"}, {"preview": 0}):
+        exact = steps_of(png_bytes(texels, lossy=size), **options)
+        assert np.array_equal([*decode_levels(exact.ptm)][-1], texels)
+    assert load_image(bare(png_bytes(texels, lossy=size), "PNG")).lossy is None
+
+
+def test_a_jpeg_that_browsers_do_not_read_is_not_sent(shared: Path) -> None:
+    folder = shared / "cases/arithmetic-jpeg"
+    kinds = {"ar.jpg": "uncommon JPEG", "base.jpg": "JPEG", "grey.jpg": "JPEG"}
+    for name, kind in kinds.items():
+        source = (folder / name).read_bytes()
+        lossy = load_image(source).lossy
+        assert lossy == (kind, len(source))
+        finest = steps_of(source).steps.previews[-1]
+        assert finest.exact == (kind == "JPEG")
+        assert finest.bytes <= len(source)
+    common = saved(photograph(8, 8), "JPEG", progressive=True)
+    assert check_jpeg(common)
+    at = common.index(b"\xff\xc2")
+    for marker in range(0xC0, 0xD0):
+        if marker not in (0xC4, 0xC8, 0xCC):
+            changed = common[: at + 1] + bytes([marker]) + common[at + 2 :]
+            assert check_jpeg(changed) == (marker <= 0xC2)
+
+
+@pytest.mark.parametrize(("format", "name"), [("WEBP", "WebP"), ("AVIF", "AVIF")])
+def test_a_lossy_image_without_its_alpha_has_the_same_colours(format: str, name: str) -> None:
+    source = saved(photograph(40, 24, 4), format, quality=70)
+    opaque = load_image(drop_alpha(source, name))
+    assert opaque.lossy is not None
+    assert np.array_equal(opaque.array(), load_image(source).array()[..., :3])
 
 
 def test_trimmed_lossy_sources_are_not_kept() -> None:

@@ -388,10 +388,10 @@ class TexturesStage(Stage[None]):
 
     name = "textures"
     about = "Encode the model's images as progressive textures."
-    recipe = 6
+    recipe = 7
     changed = (
-        "previews of the levels are written, lossy images are kept as they are, and the error "
-        "and the offset of each level are recorded"
+        "lossy images that were converted or that browsers do not read have a preview of as many "
+        "bytes"
     )
     options = TextureOptions
     opens_inputs = True

@@ -65,19 +65,34 @@ def _jpeg(data: bytes) -> Iterator[bytes]:
     yield data[at:]
 
 
-def _webp(data: bytes) -> Iterator[bytes]:
+def _webp(data: bytes, cut: Mapping[bytes, int] = _WEBP_CHUNKS) -> Iterator[bytes]:
     chunks, at = [], 12
     while at + 8 <= len(data):
         end = at + 8 + (int.from_bytes(data[at + 4 : at + 8], "little") + 1 & ~1)
         chunks.append(data[at:end])
         at = end
-    kept = [chunk for chunk in chunks if chunk[:4] not in _WEBP_CHUNKS]
+    kept = [chunk for chunk in chunks if chunk[:4] not in cut]
     for i, chunk in enumerate(kept):
         if chunk[:4] == b"VP8X":
-            flags = chunk[8] & ~sum(_WEBP_CHUNKS.values())
+            flags = chunk[8] & ~sum(cut.values())
             kept[i] = chunk[:8] + bytes([flags]) + chunk[9:]
     body = b"WEBP" + b"".join(kept)
     yield b"RIFF" + len(body).to_bytes(4, "little") + body
+
+
+_ALPHA_URN = b"urn:mpeg:mpegB:cicp:systems:auxiliary:alpha\0"
+
+
+def drop_alpha(data: bytes, format: str) -> bytes:
+    """A lossy WebP or AVIF without its alpha; other files as they are.
+
+    That of an AVIF becomes an auxiliary image of an unknown type, which readers leave alone, so
+    that no offset in the file changes.
+    """
+    if format == "AVIF":
+        return data.replace(_ALPHA_URN, _ALPHA_URN.replace(b"alpha", b"other"))
+    cut = {**_WEBP_CHUNKS, b"ALPH": 0x10}
+    return b"".join(_webp(data, cut)) if format == "WebP" else data
 
 
 _CUT: Mapping[str, Callable[[bytes], Iterator[bytes]]] = {

@@ -111,8 +111,7 @@ def open_shallow(
     with pillow_faults():
         image = opening.open_image(file, limits)
         how, texels = opening.convert_texels(image, limits)
-        lossy = opening.lossy_format(file, image)
-        result = Picture(texels, lossy=lossy)
+        result = Picture(texels, lossy=opening.lossy_source(file, image))
     return f"{what}, {how}", lambda: result
 
 
@@ -192,7 +191,7 @@ def _open_by_pillow(
         elif opening.high_colour(image):
             raise samples_error("samples of 5 or 6 bits")
         opening.check(image, limits)
-        return partial(opening.read, image, depth, opening.lossy_format(file, image))
+        return partial(opening.read, image, depth, opening.lossy_source(file, image))
 
 
 def _is_rescaled(tiles: list[Any]) -> bool:

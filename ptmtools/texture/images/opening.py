@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, PtmError
 from ptmtools.texture.images.picture import (
+    LossySource,
     Picture,
     Strips,
     check_file,
@@ -64,6 +65,8 @@ _VAGUE = ("Ppm", "Pcx", "Tga")
 READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, AVIF, PPM, PCX, Radiance, OpenEXR or .npy"
 #: The tag of EXIF and TIFF.
 ORIENTATION = 0x0112
+#: The keyword of a text in a PNG: the bytes of the lossy image that its texels come from.
+LOSSY, _SIZE = "Lossy source", re.compile("[0-9]{1,12}")
 #: Tags of TIFF.
 _TILE_WIDTH, _TILE_LENGTH = 322, 323
 #: Pillow's names for layouts of 5 and 6 bits a sample, which it scales to 8.
@@ -105,16 +108,28 @@ def open_image(file: BinaryIO, limits: Limits) -> ImageFile:
     return image
 
 
-def lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
-    """The name of the format if its compression discards detail, as far as can be recognised."""
+def lossy_source(file: BinaryIO, image: ImageFile) -> LossySource | None:
+    """The source of the texels if its compression discards detail, as far as can be recognised."""
+    if image.format == "PNG":
+        size = image.info.get(LOSSY, "")
+        return LossySource("lossy image in PNG", int(size)) if _SIZE.fullmatch(size) else None
+    format = _lossy_format(file, image)
+    return LossySource(format, file.seek(0, 2)) if format else None
+
+
+def _lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
     if image.format == "TIFF":
         return "JPEG in TIFF" if "jpeg" in str(image.info.get("compression")) else None
+    if image.format == "JPEG":
+        file.seek(0)
+        common = check_jpeg(file.read()) and image.mode in ("L", "RGB")
+        return "JPEG" if common else "uncommon JPEG"
     if image.format == "WEBP":
         file.seek(12)
         while len(head := file.read(8)) == 8 and head[:4] not in (b"VP8 ", b"VP8L"):
             file.seek(int.from_bytes(head[4:], "little") + 1 & ~1, 1)
         return "WebP" if head[:4] == b"VP8 " else None
-    return {"JPEG": "JPEG", "MPO": "JPEG", "AVIF": "AVIF"}.get(image.format or "")
+    return "AVIF" if image.format == "AVIF" else None
 
 
 def load(image: ImageFile) -> None:
@@ -231,7 +246,7 @@ def _manage_colours(image: Image) -> Image | None:
         return None
 
 
-def read(image: ImageFile, depth: int, lossy: str | None) -> Picture:
+def read(image: ImageFile, depth: int, lossy: LossySource | None) -> Picture:
     """An opened image that was checked, texels exactly as stored; ``depth`` is that of its samples,
     bits, and ``lossy`` as in `Picture`.
 
@@ -255,7 +270,7 @@ def read_strips(
     dtype: str,
     make: Callable[..., NDArray[Any]],
     key: object = None,
-    lossy: str | None = None,
+    lossy: LossySource | None = None,
 ) -> Picture:
     """Loaded images of the same size as one, a strip at a time.
 

@@ -18,7 +18,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,13 @@ from ptmtools.texture.sources import RowSource, Samples
 _STRIP_TEXELS = 1 << 18
 
 
+class LossySource(NamedTuple):
+    """The image file that texels were lossy in: the name of its format, and its bytes."""
+
+    format: str
+    bytes: int
+
+
 @dataclass(frozen=True)
 class Picture:
     """An image that can be encoded.
@@ -39,12 +46,12 @@ class Picture:
     texels: rows from the top, (h, w, c) of uint8, uint16, float16 or float32: an array, or an
         object that returns one when sliced.
     description: colour and orientation, as the file has them.
-    lossy: the name of the file's format if it discards detail, as JPEG does; else None.
+    lossy: the source of the texels if its format discards detail, as JPEG does; else None.
     """
 
     texels: RowSource
     description: Description = Description()  # noqa: RUF009  # frozen
-    lossy: str | None = None
+    lossy: LossySource | None = None
 
     def array(self) -> Samples:
         """All texels, (h, w, c)."""
@@ -176,6 +183,8 @@ MOST_SCANS = 100
 #: A marker of JPEG that is none of those between and within the data of a scan.
 _MARKER = re.compile(rb"\xff+([^\x00\xd0-\xd7\xff])", re.DOTALL)
 _SCAN, _END = 0xDA, 0xD9
+#: Markers of frames, the first three of those that browsers read, and the others in their range.
+_FRAMES, _SENT, _NO_FRAMES = range(0xC0, 0xD0), (0xC0, 0xC1, 0xC2), (0xC4, 0xC8, 0xCC)
 #: Markers without a length: the one of the beginning, and an unused one.
 _BARE = (0xD8, 0x01)
 
@@ -212,14 +221,17 @@ def check_webp(head: bytes, limits: Limits) -> None:
     check_size(width, height, 4, limits)
 
 
-def check_jpeg(data: bytes) -> None:
-    """Raise LimitError PTM-L104 for a JPEG of more than `MOST_SCANS` scans."""
+def check_jpeg(data: bytes) -> bool:
+    """Whether browsers read the process of a JPEG: not arithmetic coding, and not its lossless and
+    hierarchical forms (B.2.2). Raises LimitError PTM-L104 for more than `MOST_SCANS` scans."""
     scans = at = 0
+    is_sent = True
     while marker := _MARKER.search(data, at):
         kind, at = marker[1][0], marker.end()
         if kind == _END:
             break
         scans += kind == _SCAN
+        is_sent &= kind not in _FRAMES or kind in (*_SENT, *_NO_FRAMES)
         if scans > MOST_SCANS:
             raise LimitError(
                 "PTM-L104",
@@ -228,6 +240,7 @@ def check_jpeg(data: bytes) -> None:
             )
         if kind not in _BARE:
             at += max(2, int.from_bytes(data[at : at + 2], "big"))
+    return is_sent
 
 
 def check_tile(width: object, height: object, texel_bytes: int, limits: Limits) -> None:

@@ -16,7 +16,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.images.opening import ORIENTATION, PNG
+from ptmtools.texture.images.opening import LOSSY, ORIENTATION, PNG
 from ptmtools.texture.images.picture import format_error, image_error
 from ptmtools.texture.model import Description
 
@@ -27,10 +27,14 @@ _STRIP_BYTES = 1 << 20
 _PLAIN = Description()
 
 
-def png_bytes(image: NDArray[Any], description: Description = _PLAIN) -> bytes:
-    """(h, w, c) uint8 or uint16, 1 to 4 components, as the bytes of a PNG."""
+def png_bytes(image: NDArray[Any], description: Description = _PLAIN, lossy: int = 0) -> bytes:
+    """(h, w, c) uint8 or uint16, 1 to 4 components, as the bytes of a PNG. ``lossy``: bytes of the
+    lossy image that texels of 8 bits come from, which readers of the PNG then know; or 0."""
     buffer = io.BytesIO()
-    save_png(buffer, image, description)
+    if lossy and image.dtype.itemsize == 1:
+        _save_shallow(buffer, image, description, lossy)
+    else:
+        save_png(buffer, image, description)
     return buffer.getvalue()
 
 
@@ -41,11 +45,15 @@ def save_png(file: IO[bytes], image: NDArray[Any], description: Description = _P
     (_save_deep if image.dtype.itemsize > 1 else _save_shallow)(file, image, description)
 
 
-def _save_shallow(file: IO[bytes], image: NDArray[np.uint8], description: Description) -> None:
+def _save_shallow(
+    file: IO[bytes], image: NDArray[np.uint8], description: Description, lossy: int = 0
+) -> None:
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
     info = PngInfo()
+    if lossy:
+        info.add_text(LOSSY, str(lossy))
     for kind, data in _colour_chunks(description):
         if kind != b"iCCP":
             info.add(kind, data)
