@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.images import ImageStore, integers
+from ptmtools.scene.images import ImageStore, derived_png, integers
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import SourceMaterial, SourceTexture, SourceWrap
@@ -87,17 +87,19 @@ class MaskedBytes:
     def __call__(self) -> bytes:
         from ptmtools.texture.images.png import png_bytes
 
-        opacity = _opacities(integers(self.mask(), self.limit)[0], self.channel)
+        mask = self.mask()
+        opacity = _opacities(integers(mask, self.limit).array(), self.channel)
         if self.read is None:
             white = np.full_like(opacity, 255)
             return png_bytes(np.stack([white, opacity], axis=2))
-        texels, description = integers(self.read(), self.limit)
+        picture = integers(self.read(), self.limit)
+        texels = picture.array()
         alpha = _resize(opacity, texels.shape[1], texels.shape[0]) / 255
         colors = _colors(texels)
         has_alpha = colors.shape[2] < texels.shape[2]
         alpha *= texels[..., -1] if has_alpha else np.iinfo(texels.dtype).max
         alpha = np.rint(alpha).astype(texels.dtype)[..., None]
-        return png_bytes(np.concatenate([colors, alpha], axis=2), description)
+        return derived_png(picture, np.concatenate([colors, alpha], axis=2), len(mask))
 
 
 def _colors(texels: NDArray[Any]) -> NDArray[Any]:
@@ -169,9 +171,8 @@ class MirroredBytes:
     limit: int
 
     def __call__(self) -> bytes:
-        from ptmtools.texture.images.png import png_bytes
-
-        texels, description = integers(self.read(), self.limit)
+        picture = integers(self.read(), self.limit)
+        texels = picture.array()
         height, width, _ = texels.shape
         if 4 * height * width * (1 + self.across) * (1 + self.down) > self.limit:
             raise InputError("PTM-I125", "too large for its mirror images; repeated unmirrored")
@@ -179,7 +180,7 @@ class MirroredBytes:
             texels = np.concatenate([texels, texels[:, ::-1]], axis=1)
         if self.down:
             texels = np.concatenate([texels, texels[::-1]], axis=0)
-        return png_bytes(texels, description)
+        return derived_png(picture, texels)
 
 
 def _bake_mirror(
@@ -230,16 +231,25 @@ def emitted_wraps(texture: SourceTexture | None) -> tuple[Wrap, Wrap]:
 
 @dataclass(frozen=True)
 class OpaqueBytes:
-    """The bytes of a PNG of an image without alpha; ``limit`` and errors as of `MaskedBytes`."""
+    """The bytes of an image without alpha: of a lossy WebP or AVIF the rest of its file, of others
+    a PNG, lossless if ``exact``: previews halve the resolution of the red and green of normals.
+    ``limit`` and errors as of `MaskedBytes`."""
 
     read: Callable[[], bytes]
     limit: int
+    exact: bool = False
 
     def __call__(self) -> bytes:
-        from ptmtools.texture.images.png import png_bytes
+        from ptmtools.texture.images.bare import drop_alpha
 
-        texels, description = integers(self.read(), self.limit)
-        return png_bytes(_colors(texels), description)
+        data = self.read()
+        picture = integers(data, self.limit)
+        colors = _colors(picture.array())
+        if picture.lossy:
+            opaque = drop_alpha(data, picture.lossy.format)
+            if opaque != data and np.array_equal(integers(opaque, self.limit).array(), colors):
+                return opaque
+        return derived_png(replace(picture, lossy=None) if self.exact else picture, colors)
 
 
 def _drop_alpha(

@@ -31,7 +31,7 @@ from ptmtools.scene.model import SourceImage
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import FileRange, SourceTexture
 from ptmtools.texture.images.picture import check_bytes, check_size
-from ptmtools.texture.model import Description, Limits
+from ptmtools.texture.model import Limits
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -83,7 +83,7 @@ class VerifiedBytes:
 class ImageRecord:
     """Properties of an image: digest, Pillow's name of its format, whether it has an alpha channel,
     and its transparent texels as bits packed along rows; what has to be converted (`open_shallow`),
-    or the reason why it cannot be decoded.
+    or the reason why it cannot be decoded. ``derived``: whether it is a PNG made of a lossy image.
     """
 
     sha256: str = ""
@@ -93,6 +93,7 @@ class ImageRecord:
     bits: _Bits | None = None
     conversion: str = ""
     fault: str = ""
+    derived: bool = False
 
     @property
     def holes(self) -> NDArray[np.bool_] | None:
@@ -225,7 +226,7 @@ def _examine(texture: SourceTexture, limit: int, channel: str | None = None) -> 
 
     Raises LimitError PTM-L104.
     """
-    from ptmtools.texture.images.opening import pillow_faults
+    from ptmtools.texture.images.opening import LOSSY, pillow_faults
 
     try:
         with naming(texture.label, place=texture.place):
@@ -246,6 +247,7 @@ def _examine(texture: SourceTexture, limit: int, channel: str | None = None) -> 
         opened.width,
         bits,
         conversion,
+        derived=LOSSY in opened.info,
     )
 
 
@@ -256,14 +258,23 @@ def read_within(texture: SourceTexture, limit: int) -> bytes:
     return texture.read()
 
 
-def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
-    """(h, w, c) texels of 8 or 16 bits and the description of an image, to derive another from it.
+def integers(data: bytes, limit: int) -> Picture:
+    """An image of 8 or 16 bits, to derive another from it.
 
     ``limit`` as in `ImageStore`. Raises InputError if the image cannot be decoded, LimitError
     PTM-L104.
     """
-    picture = _open(data, limit, deep=True)[1]()
-    return picture.array(), picture.description
+    return _open(data, limit, deep=True)[1]()
+
+
+def derived_png(picture: Picture, texels: NDArray[Any], more: int = 0) -> bytes:
+    """A PNG of (h, w, c) texels made of a picture's, lossy if they are, in as many bytes a texel
+    and ``more``."""
+    from ptmtools.texture.images.png import png_bytes
+
+    (height, width), shape = picture.texels.shape[:2], texels.shape
+    lossy = picture.lossy.bytes * shape[0] * shape[1] // (height * width) if picture.lossy else 0
+    return png_bytes(texels, picture.description, lossy + more if lossy else 0)
 
 
 @dataclass(frozen=True)
@@ -274,9 +285,8 @@ class ConvertedBytes:
     limit: int
 
     def __call__(self) -> bytes:
-        from ptmtools.texture.images.png import png_bytes
-
-        return png_bytes(_open(self.read(), self.limit)[1]().array())
+        picture = _open(self.read(), self.limit)[1]()
+        return derived_png(picture, picture.array())
 
 
 class OptionalImages:
@@ -320,7 +330,7 @@ class OptionalImages:
 def mean_values(data: bytes, limit: int) -> tuple[float, ...]:
     """The mean red, green, blue and alpha of an image as encoded, from 0 to 1; all colours of a
     grey one are alike. Raises as `integers`."""
-    texels, _ = integers(data, limit)
+    texels = integers(data, limit).array()
     bands = texels.shape[2]
     channels = [0, 1, 2] if bands > 2 else [0, 0, 0]
     means = [float(texels[..., channel].mean()) for channel in channels]

@@ -102,7 +102,7 @@ def _lightmap(data: bytes, limit: int) -> bytes:
 
 def _mean(data: bytes, limit: int) -> Radiance:
     """The mean colour of an image, linear light. Raises as `integers`."""
-    texels, _ = integers(data, limit)
+    texels = integers(data, limit).array()
     largest = int(np.iinfo(texels.dtype).max)
     light = to_linear(np.arange(largest + 1) / largest)
     channels = [0, 1, 2] if texels.shape[2] > 2 else [0, 0, 0]

@@ -50,8 +50,8 @@ class HeightBytes:
     def __call__(self) -> bytes:
         from ptmtools.texture.images.png import png_bytes
 
-        texels, _ = integers(self.read(), self.limit)
-        return png_bytes(normals_of(texels[..., 0], self.rise / np.iinfo(texels.dtype).max))
+        heights = integers(self.read(), self.limit).array()[..., 0]
+        return png_bytes(normals_of(heights, self.rise / np.iinfo(heights.dtype).max))
 
 
 def normals_of(height: NDArray[Any], factor: float = 1.0) -> NDArray[np.uint8]:
@@ -126,9 +126,9 @@ class NormalMaps:
                 return None, scale
             self._note(use, "holds normals, used as a normal map")
         use = self._store.convert(use)
-        if (record := self._store.record(use)) and record.alpha:
+        if (record := self._store.record(use)) and (record.alpha or record.derived):
             self._store.mark_as_input(use)
-            return replace(use, read=OpaqueBytes(use.read, self._store.limit)), scale
+            return replace(use, read=OpaqueBytes(use.read, self._store.limit, exact=True)), scale
         return use, scale
 
     def _kind(self, use: SourceTexture) -> str:
@@ -136,7 +136,7 @@ class NormalMaps:
         if use.read not in self._kinds:
             self._kinds[use.read] = ""
             try:
-                texels, _ = integers(use.read(), self._store.limit)
+                texels = integers(use.read(), self._store.limit).array()
                 self._kinds[use.read] = kind_of(texels)
             except LimitError:
                 raise

@@ -12,10 +12,11 @@ import pytest
 from PIL import Image
 
 from ptmtools.scene import IngestOptions, Scene, ingest
-from ptmtools.scene.baking import bake
+from ptmtools.scene.baking import MirroredBytes, OpaqueBytes, bake
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import FileRange, ModelSource, SourceMaterial, SourceTexture
+from ptmtools.texture.images import load_image
 from tests.scene.conftest import Put, noise, png
 
 Textured = Callable[..., Path]
@@ -84,6 +85,49 @@ def test_an_image_of_which_another_is_made_is_not_plain(textured: Textured) -> N
     assert [image.files for image in scene.images] == [(), ("wall.png",)]
     alone = ingest(textured("map_Kd wall.png", files))
     assert [image.plain for image in alone.images] == [True]
+
+
+def lossy_bytes(scene: Scene) -> list[int]:
+    """The bytes of the lossy source of each image, 0 if it has none."""
+    sources = (load_image(image.load()).lossy for image in scene.images)
+    return [source.bytes if source else 0 for source in sources]
+
+
+def test_texels_of_a_lossy_image_are_known_as_such(textured: Textured) -> None:
+    """Through a mask, CMYK and repetition, but for normals, whose colours previews would blur."""
+    wall, mask = jpeg(noise(1, 16)), png(np.zeros((16, 16), np.uint8))
+    scene = ingest(textured("map_Kd w.jpg\nmap_d m.png", {"w.jpg": wall, "m.png": mask}))
+    assert lossy_bytes(scene) == [len(wall) + len(mask)]
+    scene = ingest(textured("map_Kd m.png\nmap_d w.jpg"))
+    assert lossy_bytes(scene) == [0]
+    heights, inks = jpeg(noise(1, 16)[..., 0]), jpeg(noise(2, 16, 4))
+    files = {"h.jpg": heights, "inks.jpg": inks}
+    scene = ingest(textured("map_Kd inks.jpg\nmap_Bump h.jpg", files))
+    assert lossy_bytes(scene) == [len(inks), 0]
+    scene = ingest(textured("map_Kd inks.jpg\nnorm inks.jpg"))
+    assert lossy_bytes(scene) == [len(inks), 0]
+    assert load_image(MirroredBytes(lambda: wall, True, True, 1 << 30)()).lossy == (
+        "lossy image in PNG",
+        4 * len(wall),
+    )
+
+
+def jpeg(pixels: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels, "CMYK" if pixels.shape[2:] == (4,) else None).save(stream, "jpeg")
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["webp", "avif"])
+def test_a_lossy_image_whose_alpha_is_ignored_keeps_its_other_bytes(kind: str) -> None:
+    stream = io.BytesIO()
+    Image.fromarray(noise(1, 16, 4)).save(stream, kind, quality=70)
+    data = stream.getvalue()
+    opaque = OpaqueBytes(lambda: data, 1 << 30)()
+    picture = load_image(opaque)
+    assert picture.lossy == ({"webp": "WebP", "avif": "AVIF"}[kind], len(opaque))
+    assert len(opaque) <= len(data)
+    assert np.array_equal(picture.array(), load_image(data).array()[..., :3])
 
 
 def mirrored(
@@ -174,6 +218,8 @@ def test_ktx2_without_its_library(put: Put, monkeypatch: pytest.MonkeyPatch) -> 
     from ptmtools.scene.gltf.compression import TranscodedBytes, transcode
     from tests.scene.features.gltf import KTX2
 
+    texels = load_image(transcode(KTX2))
+    assert texels.lossy == ("lossy image in PNG", len(KTX2))
     monkeypatch.setattr(sandbox, "find_spec", lambda name: None)
     with pytest.raises(MissingComponentError, match=r"PTM-M100"):
         transcode(KTX2)

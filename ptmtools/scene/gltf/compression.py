@@ -165,12 +165,13 @@ def transcode(data: bytes) -> bytes:
 
 def _transcode_image(ktx2: str, png: str) -> None:
     import opengl_basisu
-    from PIL import Image
+
+    from ptmtools.texture.images.png import png_bytes
 
     texture = opengl_basisu.open(ktx2)
     texels = texture.transcode("rgba8").data
-    image = Image.fromarray(texels.reshape(texture.height, texture.width, 4), "RGBA")
-    (image if texture.has_alpha else image.convert("RGB")).save(png)
+    image = texels.reshape(texture.height, texture.width, 4)[..., : 4 if texture.has_alpha else 3]
+    Path(png).write_bytes(png_bytes(image, lossy=Path(ktx2).stat().st_size))
 
 
 def _work(task: str, *arguments: str) -> None:
