@@ -141,6 +141,15 @@ def test_heights_keep_their_16_bits(textured: Textured) -> None:
     assert "PTM-N126" not in {note.code for note in scene.notes}
 
 
+def test_a_jpeg_of_12_bits_is_none_of_the_images_that_are_read(textured: Textured) -> None:
+    data = bytearray(saved(Image.fromarray(noise(1)), "jpeg"))
+    data[data.index(b"\xff\xc0") + 4] = 12
+    scene = ingest(textured("map_Kd w.jpg", {"w.jpg": bytes(data)}))
+    (note,) = [note for note in scene.notes if note.code == "PTM-N206"]
+    assert "12-bit" in note.message
+    assert "damaged" not in note.message
+
+
 def test_strict_names_all_at_once(textured: Textured) -> None:
     """One warning for each image, however many materials use it."""
     cut = png(noise(3))[:-8]

@@ -97,8 +97,8 @@ def open_image(file: BinaryIO, limits: Limits) -> ImageFile:
             module = import_module(f"PIL.{name}ImagePlugin")
             image = cast("ImageFile", getattr(module, f"{name}ImageFile")(file))
     except SyntaxError as error:
-        if "pixel mode" in str(error):
-            raise samples_error("a combination of samples that is not read") from None
+        if "pixel mode" in str(error) or "-bit layers" in str(error):
+            raise samples_error(f"a combination of samples that is not read ({error})") from None
         if name not in _VAGUE:
             raise image_error(error) from None
         raise
