@@ -42,7 +42,7 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (69_611, 337),
+    "ptmtools": (69_617, 337),
     "ptmtools/*.py": (4_150, 26),
     "ptmtools/cells": (8_325, 28),
     "ptmtools/cli": (3_110, 15),
@@ -58,7 +58,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_640, 25),
     "ptmtools/store": (2_230, 13),
-    "ptmtools/texture": (10_210, 44),
+    "ptmtools/texture": (10_216, 44),
     "ptmtools/tour": (1_340, 8),
     "ptmtools/visibility": (960, 6),
     "ptmtools_lab": (11_660, 51),

@@ -21,7 +21,7 @@ from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
 from ptmtools.texture.images import deep, floats, opening
 from ptmtools.texture.images.opening import PNG, TIFF, pillow_faults
-from ptmtools.texture.images.picture import Picture, samples_error
+from ptmtools.texture.images.picture import Picture, Strips, samples_error
 from ptmtools.texture.images.png import check_chunks, save_png
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.samples import round_to_eight_bits
@@ -106,8 +106,14 @@ def open_shallow(
             raise
         what = fault.message.partition(";")[0]
     if picture is not None:
-        texels = round_to_eight_bits(picture.array())
-        return f"{what}, converted to 8 bits", lambda: replace(picture, texels=texels)
+        texels, (height, width, *more) = picture.texels, picture.texels.shape
+        shape = (height, width, more[0] if more else 1)
+
+        def strip(y0: int, y1: int) -> Samples:
+            return round_to_eight_bits(texels[y0:y1]).reshape(y1 - y0, *shape[1:])
+
+        shallow = replace(picture, texels=Strips(shape, np.dtype(np.uint8), strip))
+        return f"{what}, converted to 8 bits", lambda: shallow
     with pillow_faults():
         image = opening.open_image(file, limits)
         how, texels = opening.convert_texels(image, limits)
