@@ -187,7 +187,7 @@ class Images:
 
         store = ImageStore(IngestNotes(self._file), LIMITS.decoded_bytes)
         texture = SourceTexture(HeldBytes(data), "a/../b.png", "map_Kd", "a.mtl:1")
-        decoded = store.add(texture)
+        decoded = store.add(store.convert(texture))
         store.record(texture, texture.channel)
         assert all("/" not in image.name for image in store.images)
         return "no image" if decoded is None else "in a scene"
@@ -219,6 +219,8 @@ def images() -> list[tuple[str, bytes]]:
     for compression in ("raw", "tiff_lzw", "tiff_adobe_deflate", "packbits", "jpeg"):
         saved("TIFF", "RGB", compression=compression)
     saved("TIFF", "1", compression="group4")
+    for kind, mode in (("TIFF", "CMYK"), ("TIFF", "LAB"), ("TIFF", "YCbCr"), ("JPEG", "CMYK")):
+        saved(kind, mode)
     for kind in ("BMP", "GIF", "TGA", "PCX", "PPM"):
         saved(kind, "RGB")
     saved("BMP", "P")
