@@ -343,8 +343,41 @@ def _glb(rng: Random, text: bytes, blob: bytes, exact: bool = False) -> bytes:
     return damaged(rng, data) if rng.random() < 0.1 else data
 
 
+DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"><asset>
+<unit meter=" 0.0254 "/> <up_axis> X_UP </up_axis> </asset>
+<library_images> <image id="i"> <init_from> wall.png </init_from> </image> </library_images>
+<library_effects> <effect id="e"> <profile_COMMON> <newparam sid="f"> <surface>
+<init_from> i </init_from> </surface> </newparam> <newparam sid="t"> <sampler2D>
+<source> f </source> <wrap_s> MIRROR </wrap_s> </sampler2D> </newparam> <technique> <phong>
+<emission> <color> 0.1 0 0 1 </color> </emission> <shininess> <float> 20 </float> </shininess>
+<diffuse> <texture texture="t" texcoord="UV"/> </diffuse> <transparent opaque="RGB_ZERO">
+<color> 0.1 0.1 0.1 1 </color> </transparent> </phong> </technique> </profile_COMMON> </effect>
+</library_effects> <library_materials> <material id="m"> <instance_effect url="#e"/> </material>
+</library_materials> <library_geometries> <geometry id="g"> <mesh> <source id="p">
+<float_array id="a"> 0 0 0 10 0 0 10 4 0 0 4 0 1 1 0 2 1 0 2 2 0 </float_array> <technique_common>
+<accessor source="#a" count="7" stride="3"/> </technique_common> </source> <source id="c">
+<float_array id="b"> 0 0 1 0 1 1 0 1 </float_array> <technique_common>
+<accessor source="#b" count="4" stride="2"/> </technique_common> </source>
+<vertices id="v"> <input semantic="POSITION" source="#p"/> </vertices> <triangles material="s">
+<input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#c" offset="1"/> <p> 0 0 1 1 2 2 0 0 2 2 3 3 </p>
+</triangles> <polylist> <input semantic="VERTEX" source="#v"/>
+<vcount> 4 3 </vcount> <p> 0 1 2 3 0 1 2 </p> </polylist> <polygons>
+<input semantic="VERTEX" source="#v"/> <ph> <p> 0 1 2 3 </p> <h> 4 5 6 </h> </ph> </polygons>
+<tristrips> <input semantic="VERTEX" source="#v"/> <p> 0 1 3 2 </p> </tristrips> </mesh>
+</geometry> </library_geometries> <library_visual_scenes> <visual_scene id="s"> <node id="n">
+<rotate> 0 0 1 90 </rotate> <lookat> 1 2 3 4 5 6 0 1 0 </lookat> <scale> 1 2 1 </scale>
+<instance_geometry url="#g"> <bind_material> <technique_common>
+<instance_material symbol="s" target="#m"> <bind_vertex_input semantic="UV" input_set="0"/>
+</instance_material> </technique_common> </bind_material> </instance_geometry> <node id="k">
+<matrix> 1 0 0 0 0 1 0 0 0 0 1 7 0 0 0 1 </matrix> <instance_node url="#l"/> </node> </node>
+<node id="l"> <instance_geometry url="#g"/> </node> </visual_scene> </library_visual_scenes>
+<scene> <instance_visual_scene url="#s"/> </scene> </COLLADA>
+"""
+
+
 class Mesh:
-    """The readers of PLY, STL and OFF; pymeshlab, which has a process of its own, is left out."""
+    """The readers of COLLADA, PLY, STL and OFF, without pymeshlab, which has its own process."""
 
     limit = 1 << 26
 
@@ -369,6 +402,7 @@ class Mesh:
             ("ply", head.format("binary_little_endian").encode() + points + faces, damaged),
             ("stl", (solid + "endsolid a\n").encode(), _words),
             ("stl", bytes(80) + struct.pack("<I", 2) + triangle * 2, damaged),
+            ("dae", DAE.encode(), _words),
             ("off", f"OFF\n4 2 0\n{corners}3 0 1 2\n3 0 2 3\n".encode(), _words),
         ]
 

@@ -25,6 +25,11 @@ def encode_srgb(light: Floats) -> NDArray[np.uint8]:
     return np.rint(255 * to_srgb(light)).astype(np.uint8)
 
 
+def color_bytes(colors: Floats) -> NDArray[np.uint8]:
+    """Colours from 0 to 1 as bytes; values are clipped, and NaN is 0."""
+    return np.rint(255 * np.clip(np.nan_to_num(colors), 0.0, 1.0)).astype(np.uint8)
+
+
 def to_linear(encoded: Floats) -> Floats:
     """The inverse of `to_srgb`."""
     clipped = np.clip(encoded, 0.0, 1.0)

@@ -98,6 +98,13 @@ GLTF = ModelFormat(
     second=Lazy("ptmtools.scene.gltf.reader:read_again"),
 )
 GLB = replace(GLTF, name="glb", about="glTF binary", suffixes=(".glb",))
+COLLADA = ModelFormat(
+    name="dae",
+    about="COLLADA",
+    suffixes=(".dae",),
+    reader=Lazy("ptmtools.scene.collada.reader:read_collada"),
+    usual_up="y",
+)
 IFC = ModelFormat(
     name="ifc",
     about="IFC",
@@ -130,14 +137,13 @@ def _mesh_format(name: str, about: str = "", reader: str = "read_by_pymeshlab") 
 FORMATS = {
     row.name: row
     for row in (
-        *(OBJ, GLB, GLTF),
+        *(OBJ, GLB, GLTF, COLLADA),
         _mesh_format("ply", reader="read_ply"),
         _mesh_format("stl", reader="read_stl"),
         _mesh_format("off", reader="read_off"),
         _mesh_format("3ds", "3D Studio"),
         _mesh_format("3mf"),
         _mesh_format("ctm", "OpenCTM"),
-        _mesh_format("dae", "COLLADA"),
         _mesh_format("wrl", "VRML"),
         _mesh_format("x3d"),
         *(IFC, IFCZIP, USD, USDZ),

@@ -141,13 +141,17 @@ class MtlMaterial:
 
     @property
     def roughness(self) -> float:
-        """As stated, or else by the exponent of the highlight, which Blender writes as
-        1000 (1 - roughness)²; 1 without a highlight."""
+        """As stated, or else by the highlight."""
         if self.pr is not None:
             return self.pr
-        if self.ks <= 0 or self.illum < _HIGHLIGHTS:
-            return 1.0
-        return 1.0 - math.sqrt(min(max(0.0, self.ns / _SHARPEST), 1.0))
+        return roughness_of(self.ks if self.illum >= _HIGHLIGHTS else 0.0, self.ns)
+
+
+def roughness_of(specular: float, exponent: float) -> float:
+    """The roughness of a surface with a highlight of a colour whose largest part is ``specular``,
+    and of this exponent (Phong 1975), which Blender writes as 1000 (1 - roughness)²."""
+    share = min(max(0.0, exponent / _SHARPEST), 1.0)
+    return 1.0 - math.sqrt(share) if specular > 0 else 1.0
 
 
 def read_mtl(path: Path, notes: IngestNotes) -> dict[str, MtlMaterial]:

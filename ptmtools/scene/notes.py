@@ -5,9 +5,10 @@ docs/formats/codes.md lists the codes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +102,15 @@ class IngestNotes:
         elif result.outcome == "elsewhere":
             self.note("PTM-N208", f"{what}: found as {self.folder.label(result.path)}", place)
         return result.path
+
+    def locate_first(
+        self, uris: Sequence[str], what: str, place: str, base: Path | None = None
+    ) -> Path | None:
+        """`locate` of the first URI that names a file, or else of the first one; percent signs
+        stand for themselves or begin an escape."""
+        names = [name for uri in uris for name in (uri, unquote(uri))]
+        known = (name for name in names if self.folder.find(name, base).path is not None)
+        return self.locate(next(known, names[1]), what, place, base=base)
 
     def camera(
         self,

@@ -83,3 +83,23 @@ def too_many_triangles(limit: int, file: Path) -> LimitError:
         file=file,
         remedy="raise the limit (--max-triangles), or split the model",
     )
+
+
+#: Exceptions of malformed documents, which can be malformed in any place.
+FAULTS = (
+    ArithmeticError,
+    AttributeError,
+    InputError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
+
+
+def fault_of(error: Exception) -> str:
+    """One line on one of `FAULTS`."""
+    if isinstance(error, InputError):
+        return error.message
+    text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
+    return text.splitlines()[0] if text else type(error).__name__

@@ -16,7 +16,9 @@ single concave polygons from 50,000 corners on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,8 @@ from numpy.typing import NDArray
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.tolerance import ROUNDING_SHARE
 
+#: Budget of pairs of corners that may join a hole to its outline, and pairs that are tested.
+_PAIRS, _TESTED = 4_000_000, 64
 #: Budget of clipping steps (one tested corner, about 3 ns): constant, and per corner of an outline.
 _BASE_STEPS, _CORNER_STEPS = 1_000_000_000, 30_000
 
@@ -92,10 +96,81 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
     return Triangulation(np.concatenate(corner)[order], owner[order], tangled)
 
 
+def cut(
+    corners: NDArray[np.float64], start: NDArray[np.int64], notes: IngestNotes, place: str
+) -> Triangulation:
+    """`triangulate` of the polygons of at least three corners; others are a miss."""
+    size = np.diff(start)
+    kept = np.flatnonzero(size >= 3)
+    if short := len(size) - len(kept):
+        notes.miss("PTM-N214", "faces of fewer than three corners", place, short)
+    rows = np.flatnonzero(np.repeat(size >= 3, size))
+    part = triangulate(corners[rows], np.concatenate([[0], np.cumsum(size[kept])]))
+    result = Triangulation(rows[part.corner], kept[part.polygon], part.tangled)
+    result.note(notes, place)
+    return result
+
+
+def keyhole(loops: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.int64], int]:
+    """The outline that walks around a polygon and its holes, along a bridge to each hole and back.
+
+    ``loops`` are (n, 3) corners: the outline, then holes of either direction. Returns the corners
+    by their numbers over all loops; and the number of holes that are left out, because they are
+    beyond a budget.
+    """
+    sizes = [len(loop) for loop in loops]
+    if not sizes or sizes[0] < 3:
+        return np.arange(sizes[0] if sizes else 0), 0
+    normal = np.cross(loops[0] - loops[0][0], np.roll(loops[0], -1, axis=0) - loops[0][0]).sum(0)
+    axis = int(np.abs(normal).argmax())
+    flat = np.concatenate(loops)[:, [(axis + 1) % 3, (axis + 2) % 3]]
+    rings = [np.arange(n) + first for n, first in zip(sizes, np.cumsum([0, *sizes]), strict=False)]
+    following = flat[np.concatenate([np.roll(ring, -1) for ring in rings])]
+    path, budget, omitted = rings[0], _PAIRS, 0
+    for ring in rings[1:]:
+        hole = ring if _turn(flat[ring]) * _turn(flat[rings[0]]) < 0 else ring[::-1]
+        budget -= len(path) * len(hole)
+        if len(hole) < 3 or budget < 0:
+            omitted += 1
+            continue
+        distance = ((flat[path][:, None] - flat[hole]) ** 2).sum(axis=2).ravel()
+        near = np.argpartition(distance, min(_TESTED, len(distance)) - 1)[:_TESTED]
+        near = near[np.argsort(distance[near], kind="stable")].tolist()
+        pairs = [divmod(pair, len(hole)) for pair in near]
+        i, j = next(
+            (p for p in pairs if not _crosses(flat[path[p[0]]], flat[hole[p[1]]], flat, following)),
+            pairs[0],
+        )
+        path = np.concatenate([path[: i + 1], hole[j:], hole[: j + 1], path[i:]])
+    return path, omitted
+
+
+def _turn(loop: NDArray[np.float64]) -> float:
+    """Twice the area of a loop (n, 2), counter-clockwise positive."""
+    x, y = (loop - loop[0]).T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _crosses(
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    c: NDArray[np.float64],
+    d: NDArray[np.float64],
+) -> bool:
+    """Whether the line from a to b crosses one of the (n, 2) lines from c to d."""
+
+    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> Any:
+        pq, pr = q - p, r - p
+        return pq[..., 0] * pr[..., 1] - pq[..., 1] * pr[..., 0]
+
+    apart = (side(a, b, c) * side(a, b, d) < 0) & (side(c, d, a) * side(c, d, b) < 0)
+    return bool(apart.any())
+
+
 def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Fans (m, n - 2, 3) of local indices, and (m,) whether they are valid."""
     m, n, _ = shape.shape
-    fan = _fan(n)
+    fan = fan_of(n)
     with np.errstate(all="ignore"):
         cross = np.cross(shape[:, 1:-1], shape[:, 2:])
         normal = cross.sum(axis=1)
@@ -114,10 +189,17 @@ def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.boo
     return cut, right
 
 
-def _fan(n: int) -> NDArray[np.int64]:
-    """(n - 2, 3) local indices of the fan around the first corner."""
+def fan_of(n: int) -> NDArray[np.int64]:
+    """(n - 2, 3) local indices of the fan around the first of n corners."""
     second = np.arange(1, n - 1)
     return np.stack([np.zeros_like(second), second, second + 1], axis=1)
+
+
+def strip_of(n: int) -> NDArray[np.int64]:
+    """(n - 2, 3) local indices of the strip over n corners."""
+    strip = np.arange(max(n - 2, 0))[:, None] + np.arange(3)
+    strip[1::2] = strip[1::2, ::-1]
+    return strip
 
 
 def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64], bool, int]:
@@ -125,7 +207,7 @@ def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64
     about ``steps`` at most."""
     n = len(shape)
     cross = np.cross(shape[1:-1], shape[2:])
-    fan = _fan(n)
+    fan = fan_of(n)
     if np.abs(cross).max() <= ROUNDING_SHARE:
         return fan[:1], True, 0  # a line or a point, represented by one degenerate triangle
     normal = cross.sum(axis=0)

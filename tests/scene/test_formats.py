@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from ctypes.util import find_library
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,7 +54,8 @@ def test_a_wall(put: Put, pymeshlab: None, name: str) -> None:
     assert scene.materials[0].name in ("default", "material_0")
 
 
-def test_a_textured_ply_keeps_every_image(put: Put, pymeshlab: None) -> None:
+def textured_ply(put: Put) -> Path:
+    """Two faces with an image each."""
     put("maps/a.png", png(noise(1)))
     put("maps/b.png", png(noise(2)))
     header = PLY.format(
@@ -61,38 +63,20 @@ def test_a_textured_ply_keeps_every_image(put: Put, pymeshlab: None) -> None:
         coords="property list uchar float texcoord\nproperty int texnumber\n",
     ).replace("face 1", "face 2")
     faces = "3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 1 1 0 1 1\n"
-    scene = ingest(put("wall.ply", header + CORNERS + faces))
+    return put("wall.ply", header + CORNERS + faces)
+
+
+def test_a_textured_ply_keeps_every_image(put: Put, pymeshlab: None) -> None:
+    scene = ingest(textured_ply(put))
     assert [i.name for i in scene.images] == ["a.png", "b.png"]
     assert scene.materials[int(scene.triangle_material[1])].image == 1
     assert scene.uv[0].tolist() == [[0, 0], [1, 0], [1, 1]]
 
 
-DAE = """<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit meter="1" name="meter"/><up_axis>Y_UP</up_axis></asset>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="pa" count="12">0 0 0 10 0 0 10 4 0 0 4 0</float_array>
-<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>
-<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/>
-<p>0 1 2 0 2 3</p></triangles></mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node id="n"><matrix>1 0 0 5 0 1 0 0 0 0 2 0 0 0 0 1
-</matrix><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>
-"""
-
-
-def test_collada(put: Put, pymeshlab: None) -> None:
-    scene = ingest(put("Wand ä.dae", DAE))
-    assert len(scene.triangles) == 2
-    assert sorted(np.ptp(scene.points, axis=0)) == [0, 4, 10]
-
-
 def test_without_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(MissingComponentError, match=r"pip install pymeshlab.*PTM-M100"):
-        ingest(put("a.dae", DAE))
+        ingest(put("a.3ds", "x"))
 
 
 def test_plain_models_do_not_need_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,20 +122,20 @@ def test_heads_that_lie(put: Put, pymeshlab: None, name: str) -> None:
         ('print(\'noise\\nptmtools answers: {"fault": "no"}\')', "cannot read it (no)"),
         (
             'print(\'ptmtools answers: {"error": ["InputError", {"code": "PTM-I254", \''
-            '\'"message": "is no good", "file": "a.dae"}]}\')',
-            "a.dae: is no good",
+            '\'"message": "is no good", "file": "a.3ds"}]}\')',
+            "a.3ds: is no good",
         ),
     ],
 )
 def test_a_reader_that_fails_does_no_harm(
     put: Put, pymeshlab: None, monkeypatch: pytest.MonkeyPatch, program: str, message: str
 ) -> None:
-    path = put("a.dae", DAE)
+    path = put("a.3ds", "x")
     command = put("python", f"#!{sys.executable}\n{program}\n")
     command.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(command))
     monkeypatch.setattr(apart, "_SECONDS", 1.0)
-    with pytest.raises(InputError, match=r"a\.dae.*PTM-I254") as caught:
+    with pytest.raises(InputError, match=r"a\.3ds.*PTM-I254") as caught:
         ingest(path)
     assert message in str(caught.value)
 
@@ -159,11 +143,11 @@ def test_a_reader_that_fails_does_no_harm(
 def test_nothing_is_imported_from_the_present_folder(
     put: Put, pymeshlab: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = put("a.dae", DAE)
+    path = textured_ply(put)
     put("json.py", "raise SystemExit('from the folder of the model')")
     put("pymeshlab.py", "raise SystemExit('from the folder of the model')")
     monkeypatch.chdir(path.parent)
-    assert len(ingest("a.dae").triangles) == 2
+    assert len(ingest("wall.ply").triangles) == 2
 
 
 @pytest.mark.filterwarnings("error")

@@ -218,7 +218,7 @@ class SceneStage(Stage["Scene"]):
     name = "scene"
     about = "Read a model."
     recipe = 17
-    changed = "images are converted to 8 bits and to RGB where necessary"
+    changed = "images and files of more kinds are read"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

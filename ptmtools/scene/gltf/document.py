@@ -145,26 +145,6 @@ class GltfDocument:
         return elements(accessor, self.tree["bufferViews"][view] | place, buffer.data)
 
 
-#: Exceptions of malformed documents, which can be malformed in any place.
-FAULTS = (
-    ArithmeticError,
-    AttributeError,
-    InputError,
-    LookupError,
-    RecursionError,
-    TypeError,
-    ValueError,
-)
-
-
-def fault_of(error: Exception) -> str:
-    """One line on one of `FAULTS`."""
-    if isinstance(error, InputError):
-        return error.message
-    text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
-    return text.splitlines()[0] if text else type(error).__name__
-
-
 def damage(path: Path, reason: str, place: str | None = None) -> InputError:
     """The error for a file that violates glTF 2.0, PTM-I249."""
     return InputError(

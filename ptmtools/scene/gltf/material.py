@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.gltf.compression import TranscodedBytes
-from ptmtools.scene.gltf.document import FAULTS, GltfDocument, data_uri, fault_of
+from ptmtools.scene.gltf.document import GltfDocument, data_uri
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import FAULTS, fault_of
 from ptmtools.scene.source import (
     DARK,
     FileRange,

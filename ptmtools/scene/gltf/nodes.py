@@ -15,11 +15,12 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.glb import natural
 from ptmtools.scene.colors import luminance
-from ptmtools.scene.gltf.document import FAULTS, GltfDocument, fault_of
+from ptmtools.scene.gltf.document import GltfDocument
 from ptmtools.scene.gltf.material import finite
 from ptmtools.scene.lights import MOST, Lamp, LampKind
 from ptmtools.scene.model import Camera
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.options import FAULTS, fault_of
 
 _INSTANCING, _LIGHTS = "EXT_mesh_gpu_instancing", "KHR_lights_punctual"
 _DEFAULTS = {

@@ -23,18 +23,22 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.colors import encode_srgb
 from ptmtools.scene.gltf.compression import DRACO, DracoPrimitive, decode_primitives
 from ptmtools.scene.gltf.document import (
-    FAULTS,
     GltfDocument,
     check_extensions,
     damage,
     document_json,
-    fault_of,
     open_document,
 )
 from ptmtools.scene.gltf.material import GltfMaterialReader, MaterialUse, TextureOf
 from ptmtools.scene.gltf.nodes import cameras, instance_count, instances, lamps, world_matrices
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.options import MAX_VERTICES, IngestOptions, too_many_triangles
+from ptmtools.scene.options import (
+    FAULTS,
+    MAX_VERTICES,
+    IngestOptions,
+    fault_of,
+    too_many_triangles,
+)
 from ptmtools.scene.source import MeshArrays, ModelSource, Purpose, SecondReading
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
