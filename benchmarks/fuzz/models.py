@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garbled, twisted
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, Scene, ingest
+from ptmtools.scene.polygon import triangulate
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.texture.images import png_bytes
 
@@ -376,8 +377,41 @@ DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"><asset>
 """
 
 
+VRML = """#VRML V2.0 utf8
+PROTO Wall [ field SFVec3f at 0 0 1 field MFNode parts [ ] ] { Transform { translation IS at
+children [ Group { children IS parts } USE quad ] } }
+DEF top Transform { center 1 0 0 rotation 0 0 1 1.5 scale 2 1 1 scaleOrientation 1 0 0 0.5
+children [
+DEF quad Shape { appearance Appearance { material Material { diffuseColor 1 0 0 transparency 0.5 }
+texture ImageTexture { url [ "none.png" "wall.png" ] repeatS FALSE }
+textureTransform TextureTransform { scale 2 2 rotation 0.5 center 1 1 } }
+geometry IndexedFaceSet { coord Coordinate { point [ 0 0 0, 10 0 0, 10 4 0, 0 4 0 ] }
+coordIndex [ 0 1 2 3 -1 0 2 3 -1 ] color Color { color [ 1 0 0, 0 1 0 ] } colorPerVertex FALSE
+texCoord TextureCoordinate { point [ 0 0, 1 1 ] } texCoordIndex [ 0 1 0 1 -1 0 1 0 -1 ] } } ] }
+Wall { at 1 2 3 parts [ Wall { } Shape { geometry Box { size 1 2 3 } } ] }
+LOD { level [ Shape { geometry Cone { bottom FALSE } } ] } Inline { url "a.wrl" }
+Switch { whichChoice 0 choice [ Shape { geometry Sphere { radius 2 } } ] }
+Shape { geometry ElevationGrid { xDimension 2 zDimension 2 height [ 0 1 2 3 ] } }
+Shape { geometry Extrusion { spine [ 0 0 0, 0 1 0, 1 1 0 ] scale [ 1 1 ] endCap FALSE } }
+Viewpoint { position 1 2 3 orientation 0 1 0 1 fieldOfView 0.8 description "eye" }
+Script { eventIn SFTime t url "x" } ROUTE a.b TO c.d
+"""
+X3D = """<X3D> <Scene> <Transform DEF="a" translation=" 1 2 3 " scale=" 1 2 1 "> <Shape>
+<Appearance> <Material diffuseColor=" 1 0 0 " transparency=" 0.5 "/>
+<ImageTexture url=' "none.png" "wall.png" '/> </Appearance>
+<IndexedFaceSet coordIndex=" 0 1 2 3 -1 " solid=" false ">
+<Coordinate point=" 0 0 0 10 0 0 10 4 0 0 4 0 "/> </IndexedFaceSet> </Shape> </Transform>
+<Transform USE="a"/> <Shape> <IndexedTriangleStripSet index=" 0 1 3 2 -1 ">
+<Coordinate point=" 0 0 0 10 0 0 10 4 0 0 4 0 "/> </IndexedTriangleStripSet> </Shape>
+<Shape> <TriangleFanSet fanCount=" 4 "> <Coordinate point=" 0 0 0 10 0 0 10 4 0 0 4 0 "/>
+<ColorRGBA color=" 0 0 0 1 0 0 1 1 1 1 0 0 0 0 0 1 "/> </TriangleFanSet> </Shape>
+<Shape> <QuadSet> <Coordinate point=" 0 0 0 10 0 0 10 4 0 0 4 0 "/> </QuadSet> </Shape>
+</Scene> </X3D>
+"""
+
+
 class Mesh:
-    """The readers of COLLADA, PLY, STL and OFF, without pymeshlab, which has its own process."""
+    """The readers of COLLADA, VRML, X3D, PLY, STL and OFF, without pymeshlab."""
 
     limit = 1 << 26
 
@@ -385,6 +419,9 @@ class Mesh:
         from ptmtools.scene import libraries
 
         libraries.convert = _no_meshlab
+        # Compiles the cutting of concave polygons, or loads it from its cache, which is pickled.
+        star = np.array([[2.0, 0, 2], [4, 0, 1], [3, 0, 3], [4, 0, 5], [1, 0, 4]])
+        triangulate(star[[1, 2, 3, 4, 0]], np.array([0, 5]))
         furnished(folder, outside)
         self._folder = folder
         corners = "0 0 0\n10 0 0\n10 4 0\n0 4 0\n"
@@ -403,6 +440,9 @@ class Mesh:
             ("stl", (solid + "endsolid a\n").encode(), _words),
             ("stl", bytes(80) + struct.pack("<I", 2) + triangle * 2, damaged),
             ("dae", DAE.encode(), _words),
+            ("wrl", VRML.replace('Inline { url "a.wrl" }', "").encode(), _words),
+            ("wrl", VRML.encode(), _words),
+            ("x3d", X3D.encode(), _words),
             ("off", f"OFF\n4 2 0\n{corners}3 0 1 2\n3 0 2 3\n".encode(), _words),
         ]
 

@@ -105,6 +105,15 @@ COLLADA = ModelFormat(
     reader=Lazy("ptmtools.scene.collada.reader:read_collada"),
     usual_up="y",
 )
+VRML = ModelFormat(
+    name="wrl",
+    about="VRML",
+    suffixes=(".wrl", ".wrz", ".vrml"),
+    reader=Lazy("ptmtools.scene.x3d.reader:read_x3d"),
+    metres=1.0,
+    up="y",
+)
+X3D = replace(VRML, name="x3d", about="X3D", suffixes=(".x3d", ".x3dv"))
 IFC = ModelFormat(
     name="ifc",
     about="IFC",
@@ -137,16 +146,14 @@ def _mesh_format(name: str, about: str = "", reader: str = "read_by_pymeshlab") 
 FORMATS = {
     row.name: row
     for row in (
-        *(OBJ, GLB, GLTF, COLLADA),
+        *(OBJ, GLB, GLTF),
         _mesh_format("ply", reader="read_ply"),
         _mesh_format("stl", reader="read_stl"),
         _mesh_format("off", reader="read_off"),
         _mesh_format("3ds", "3D Studio"),
         _mesh_format("3mf"),
         _mesh_format("ctm", "OpenCTM"),
-        _mesh_format("wrl", "VRML"),
-        _mesh_format("x3d"),
-        *(IFC, IFCZIP, USD, USDZ),
+        *(COLLADA, VRML, X3D, IFC, IFCZIP, USD, USDZ),
     )
 }
 

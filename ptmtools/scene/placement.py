@@ -71,3 +71,20 @@ def place_nodes(
         yield node, world
         for child in children(node):
             frames.setdefault(id(child), []).append(world)
+
+
+def translation(offset: Floats) -> Floats:
+    """(4, 4) of three numbers."""
+    result = np.eye(4)
+    result[:3, 3] = offset
+    return result
+
+
+def rotation(axis: Floats, angle: float) -> Floats:
+    """(4, 4) about an axis of any length, in radians; the identity about one of length 0."""
+    result, length = np.eye(4), float(np.linalg.norm(axis))
+    if length > 0:
+        x, y, z = axis / length
+        k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        result[:3, :3] += np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+    return result

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import cross
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.tolerance import ROUNDING_SHARE
 
@@ -172,15 +173,15 @@ def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.boo
     m, n, _ = shape.shape
     fan = fan_of(n)
     with np.errstate(all="ignore"):
-        cross = np.cross(shape[:, 1:-1], shape[:, 2:])
-        normal = cross.sum(axis=1)
-        right = (np.einsum("mkc,mc->mk", cross, normal) > ROUNDING_SHARE).all(axis=1)
+        corner = cross(shape[:, 1:-1], shape[:, 2:])
+        normal = corner.sum(axis=1)
+        right = (np.einsum("mkc,mc->mk", corner, normal) > ROUNDING_SHARE).all(axis=1)
     cut = np.tile(fan, (m, 1, 1))
     if n == 4:
         second_fan = np.array([[1, 2, 3], [1, 3, 0]])
         with np.errstate(all="ignore"):
             b = shape - shape[:, 1:2]
-            halves = np.stack([np.cross(b[:, 2], b[:, 3]), np.cross(b[:, 3], b[:, 0])], axis=1)
+            halves = np.stack([cross(b[:, 2], b[:, 3]), cross(b[:, 3], b[:, 0])], axis=1)
             turned = (np.einsum("mkc,mc->mk", halves, normal) > ROUNDING_SHARE).all(axis=1)
         cut[turned & ~right] = second_fan
         right |= turned

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measu
 #: Inputs of a kind: as many as a few seconds of one processor allow.
 COUNT = {
     "ptm": 250,
+    "mesh": 250,
     "manifest": 200,
     "list": 100,
     "apo": 150,

@@ -36,7 +36,7 @@ from ptmtools.scene.obj import read_obj
 from ptmtools.scene.source import FileRange
 from tests.memory import little_memory
 
-from .conftest import FACE, QUAD, GltfModel, Put, broken, noise, png
+from .conftest import FACE, QUAD, GltfModel, Put, broken, noise, png, read_source
 
 SECRET = png(noise(9))
 
@@ -159,6 +159,40 @@ def test_gltf_does_not_lead_out(put: Put, house: Path, name: str, what: str) -> 
     else:
         with pytest.raises(InputError, match=r"PTM-I20[35]"):
             ingest(path)
+
+
+#: Models with an image, and one with a file of its own.
+OTHERS = {
+    "dae": "<COLLADA><library_images><image id='i'><init_from>{}</init_from></image>"
+    "</library_images><library_effects><effect id='e'><profile_COMMON><technique><lambert><diffuse>"
+    "<texture texture='i'/></diffuse></lambert></technique></profile_COMMON></effect>"
+    "</library_effects><library_materials><material id='m'><instance_effect url='#e'/></material>"
+    "</library_materials><library_geometries><geometry id='g'><mesh><source id='p'><float_array "
+    "id='a'>0 0 0 9 0 0 9 4 0</float_array><technique_common><accessor source='#a' count='3' "
+    "stride='3'/></technique_common></source><vertices id='v'><input semantic='POSITION' "
+    "source='#p'/></vertices><triangles material='m'><input semantic='VERTEX' source='#v'/>"
+    "<p>0 1 2</p></triangles></mesh></geometry></library_geometries><library_visual_scenes>"
+    "<visual_scene><node><instance_geometry url='#g'/></node></visual_scene>"
+    "</library_visual_scenes></COLLADA>",
+    "wrl": "#VRML V2.0 utf8\nShape {{ appearance Appearance {{ texture ImageTexture {{ url "
+    '"{}" }} }} geometry Box {{ }} }}',
+    "x3d": "<Scene><Inline url='{}'/><Shape><Box/></Shape></Scene>",
+}
+
+
+@pytest.mark.parametrize("name", [*NAMES, *ESCAPED[:-1]])
+@pytest.mark.parametrize("suffix", OTHERS)
+def test_other_formats_do_not_lead_out(put: Put, house: Path, name: str, suffix: str) -> None:
+    """Backslashes, quotes and what a document cannot hold are written as its format has them."""
+    name = name.format(house.parent).replace("\0", "%00")
+    if suffix == "wrl":
+        name = name.replace("\\", "\\\\").replace('"', '\\"')
+    path = put(f"house/a.{suffix}", OTHERS[suffix].format(name))
+    notes = IngestNotes(path)
+    source = read_source(path, notes)
+    assert all(material.texture is None for material in source.materials)
+    assert [note.code for note in notes.entries if note.code in ("PTM-N204", "PTM-N205")]
+    assert all(".." not in file.split("/") for file in notes.folder.sought)
 
 
 def test_a_file_that_turns_into_a_pipe_is_not_waited_for(put: Put, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.scene.markup import floats, parse_xml
 from ptmtools.scene.notes import IngestNotes
+from ptmtools.scene.placement import rotation, translation
 
 #: Most numbers that a value without named parameters has: red, green, blue and alpha.
 _WIDEST = 4
@@ -114,23 +115,6 @@ def matrix_of(node: Element) -> Floats:
                 if len(values) != size:
                     raise ValueError(f"{element.tag} of {len(values)} numbers")
                 result = result @ build(values)
-    return result
-
-
-def translation(offset: Floats) -> Floats:
-    """(4, 4) of three numbers."""
-    result = np.eye(4)
-    result[:3, 3] = offset
-    return result
-
-
-def rotation(axis: Floats, angle: float) -> Floats:
-    """(4, 4) about an axis of any length, in radians; the identity about one of length 0."""
-    result, length = np.eye(4), float(np.linalg.norm(axis))
-    if length > 0:
-        x, y, z = axis / length
-        k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        result[:3, :3] += np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
     return result
 
 
