@@ -4,13 +4,17 @@ pymeshlab (GPL-3, needs libGL) does not expose which face has which texture, but
 files. So a child process (`sandbox`) converts the model to OBJ in a temporary folder, and `obj`
 reads the result: ``python -P -m ptmtools.scene.libraries MEMORY MODEL FOLDER`` writes ``0.obj``, …
 and replies with their labels. The same path reads files that trimesh cannot read (mixed polygons in
-OFF), and textured PLY, of which trimesh keeps one image. Both libraries cut polygons as fans.
+OFF), and PLY whose faces have coordinates, of which trimesh keeps one image. Both libraries cut
+polygons as fans.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import tempfile
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +27,14 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.options import IngestOptions, damage
 from ptmtools.scene.sandbox import run_in_sandbox, serve
-from ptmtools.scene.source import MeshArrays, ModelSource, SourceMaterial
+from ptmtools.scene.source import (
+    FileRange,
+    MeshArrays,
+    ModelSource,
+    SourceMaterial,
+    SourceTexture,
+    decode,
+)
 
 
 def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
@@ -63,6 +74,8 @@ def _convert(path: str, scratch: str) -> list[str]:
     return labels
 
 
+#: The names of texture coordinates of vertices, of which trimesh knows some.
+_VERTEX_COORDINATES = re.compile(r"^property \w+ (texture_u|u|s)\s", re.MULTILINE)
 #: Bytes of a PLY file that contain its header.
 _HEADER = 1 << 14
 
@@ -70,10 +83,23 @@ _HEADER = 1 << 14
 def read_ply(
     path: Path, notes: IngestNotes, options: IngestOptions, progress: Progress = silent
 ) -> ModelSource:
-    """Reads a PLY file. Raises the errors of `read_by_pymeshlab`."""
-    if _has_textures(path, notes):
-        return read_by_pymeshlab(path, notes, options, progress)
-    return read_off(path, notes, options, progress, kind="ply")
+    """Reads a PLY file: one with coordinates of vertices has one image, and one with coordinates of
+    faces any number. Raises the errors of `read_by_pymeshlab`."""
+    with open(path, "rb") as stream:
+        head = decode(stream.read(_HEADER).split(b"end_header")[0])
+    images = re.findall(r"^comment TextureFile (.*?)[ \t\r]*$", head, re.MULTILINE | re.IGNORECASE)
+    if images and " red" in head:
+        notes.note("PTM-N215", "colours of vertices dropped in favour of textures")
+    if not images or _VERTEX_COORDINATES.search(head) is None or "texcoord" in head:
+        read = read_by_pymeshlab if images else partial(read_off, kind="ply")
+        return read(path, notes, options, progress)
+    source = read_off(path, notes, options, progress, kind="ply")
+    if len(set(images)) > 1:
+        notes.note("PTM-N215", "all textures but the first ignored")
+    what = f"TextureFile {images[0]}"
+    file = notes.locate(images[0], what, path.name)
+    texture = None if file is None else SourceTexture(FileRange(file), file.name, what, path.name)
+    return replace(source, materials=tuple(replace(m, texture=texture) for m in source.materials))
 
 
 def read_off(
@@ -111,15 +137,6 @@ def read_stl(
         raise damage(path, str(error)) from None
 
 
-def _has_textures(path: Path, notes: IngestNotes) -> bool:
-    with open(path, "rb") as stream:
-        head = stream.read(_HEADER).split(b"end_header")[0].lower()
-    textured = b"texturefile" in head
-    if textured and b" red" in head:
-        notes.note("PTM-N215", "colours of vertices dropped in favour of textures")
-    return textured
-
-
 def _read_by_trimesh(path: Path, notes: IngestNotes, kind: str) -> ModelSource:
     import trimesh
 
@@ -135,7 +152,9 @@ def _read_by_trimesh(path: Path, notes: IngestNotes, kind: str) -> ModelSource:
             raise InputError("PTM-I245", "a face refers to a missing vertex", file=path)
         number = arrays.add_objects(path.stem if len(scene.geometry) == 1 else str(geometry))
         frame, colors = np.asarray(matrix)[None], _colors(mesh, faces, notes)
-        arrays.add(number, points, faces, frames=frame, colors=colors)
+        textured = getattr(mesh.visual, "kind", None) == "texture" and len(faces)
+        uv = np.asarray(mesh.visual.uv, np.float64)[faces] if textured else None
+        arrays.add(number, points, faces, frames=frame, uv=uv, colors=colors)
     if not any(map(len, arrays.triangles)):
         raise _no_faces(path)
     return arrays.source()

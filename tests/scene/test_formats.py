@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError
-from ptmtools.scene import ingest, sandbox as apart
+from ptmtools.scene import IngestOptions, ingest, sandbox as apart
 
 from .conftest import Put, noise, png, read_source
 
@@ -71,6 +71,35 @@ def test_a_textured_ply_keeps_every_image(put: Put, pymeshlab: None) -> None:
     assert [i.name for i in scene.images] == ["a.png", "b.png"]
     assert scene.materials[int(scene.triangle_material[1])].image == 1
     assert scene.uv[0].tolist() == [[0, 0], [1, 0], [1, 1]]
+
+
+@pytest.mark.parametrize("names", ["s t", "u v", "texture_u texture_v"])
+def test_a_ply_with_coordinates_of_vertices(
+    put: Put, monkeypatch: pytest.MonkeyPatch, names: str
+) -> None:
+    """Its image is on all faces."""
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    put("maps/a b.png", png(noise(1)))
+    more = "comment TextureFile maps/a b.png\n"
+    first, second = names.split()
+    axis = "property float z\n"
+    more_axes = f"{axis}property float {first}\nproperty float {second}\n"
+    head = PLY.format(more=more, coords="").replace(axis, more_axes)
+    text = f"{head}0 0 0 0 0\n10 0 0 2 0\n10 4 0 2 1\n0 4 0 0 1\n4 0 1 2 3\n"
+    scene = ingest(put("wall.ply", text), IngestOptions(unit="m", up="y"))
+    assert [image.name for image in scene.images] == ["a_b.png"]
+    assert scene.materials[0].image == 0
+    places = (scene.corners - scene.points.min(axis=0)).reshape(-1, 3)
+    assert scene.uv.reshape(-1, 2) == pytest.approx(places[:, :2] / [5, 4])
+    missing = ingest(put("wall.ply", text.replace("a b.png", "c.png")))
+    assert "PTM-N204" in {note.code for note in missing.notes}
+
+
+def test_the_case_of_a_ply(shared: Path) -> None:
+    scene = ingest(shared / "cases/ply-vertex-uv/m.ply")
+    assert [image.name for image in scene.images] == ["a.png"]
+    assert len(scene.triangles) == 12
+    assert scene.uv.max() == 8
 
 
 def test_without_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
