@@ -4,6 +4,10 @@ Points are welded if their coordinates are equal, not if they are near: nearness
 planes of the cells. A face is degenerate if its height is below the rounding of the coordinates.
 Duplicates have the same three points and winding, in any rotation.
 
+Two walls of opposite winding in one place are paired by their polygons, because a file or a reader
+may cut one along the other diagonal: triangles are joined over the edges that one side alone has,
+and what then has the same outline, the other way round, is a pair.
+
 A face is a stray if a corner lies a thousand sizes of the model beyond it. All tolerances are
 shares of the extent, so one stray at 100 km would take the doorways from a house of 10 m. (Kept as
 distant objects with the tolerances of the rest, strays would lie beyond what float32 and the grid
@@ -17,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.tolerance import ROUNDING_SHARE
+from ptmtools.arrays import normals, units
+from ptmtools.tolerance import PLANE_SHARE, ROUNDING_SHARE, TIE_SHARE
 
 #: A face is a stray beyond this many sizes of the faces around the middle of the model,
 _REACH = 1000.0
@@ -34,7 +39,8 @@ class KeptFaces:
     points: (V, 3) float64 distinct points in the order of first use, each used.
     triangles: (T, 3) int64 into `points`.
     source: (T,) int64 number of each face before cleaning, increasing.
-    paired: (T,) bool, another kept face has the same points and the opposite winding.
+    paired: (T,) bool, the face, or a flat polygon of which it is a part, has an opposite with the
+        same outline and the other winding.
     keeper: (N,) int64 for every face before cleaning: the face kept in its place, or -1 if it was
         dropped as degenerate, stray or not finite.
     not_finite, degenerate: numbers of dropped faces.
@@ -84,16 +90,82 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
 
     kept = np.sort(kept)
     points, index = _compact(welded, index[kept])
+    paired = paired[kept]
+    alone = np.flatnonzero(~paired)
+    paired[alone] = opposite_polygons(points, index[alone])
     return KeptFaces(
         points=points,
         triangles=index,
         source=source[kept],
-        paired=paired[kept],
+        paired=paired,
         keeper=keeper,
         not_finite=int((~finite).sum()),
         degenerate=int(thin.sum()),
         strays=strays,
     )
+
+
+def opposite_polygons(
+    points: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """(T,) which of (T, 3) triangles over (P, 3) finite points are in a flat polygon with an
+    opposite."""
+    if len(triangles) < 2:
+        return np.zeros(len(triangles), dtype=bool)
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    third = np.roll(triangles, 1, axis=1).ravel()
+    edge = np.minimum(start, end) * len(points) + np.maximum(start, end)
+    order = np.argsort(edge, kind="stable")
+    change = np.flatnonzero(np.append(True, edge[order][1:] != edge[order][:-1]))
+    two = change[np.diff(np.append(change, len(order))) == 2]
+    first, second = order[two], order[two + 1]
+    with np.errstate(all="ignore"):  # relative to the extent, as in `_degenerate`
+        low = points.min(axis=0)
+        extent = float((points.max(axis=0) - low).max())
+        local = (points - low) / extent
+        normal = normals(local[triangles])
+        height = units(normal)[first // 3] * (local[third[second]] - local[start[first]])
+        flat = np.abs(height.sum(axis=1)) <= PLANE_SHARE
+        flat &= (normal[first // 3] * normal[second // 3]).sum(axis=1) > 0
+    inner = flat & (start[first] == end[second])
+    first, second = first[inner], second[inner]
+    polygon = _groups(len(triangles), first // 3, second // 3)
+    outline = np.ones(len(start), dtype=bool)
+    outline[first] = outline[second] = False
+    # The sum of a mark of each edge of an outline tells it from others, and from its reverse.
+    count = int(polygon.max()) + 1
+    sums = np.zeros((2, count), dtype=np.uint64)
+    owner = np.repeat(polygon, 3)[outline]
+    for row, ends in enumerate(((start, end), (end, start))):
+        np.add.at(sums[row], owner, _marks(ends[0][outline], ends[1][outline]))
+    area = np.zeros((count, 3))
+    np.add.at(area, polygon, normal)
+    by_outline = np.argsort(sums[0], kind="stable")
+    place = np.searchsorted(sums[0], sums[1], sorter=by_outline)
+    match = by_outline[np.minimum(place, count - 1)]
+    same = np.linalg.norm(area + area[match], axis=1) <= TIE_SHARE * np.linalg.norm(area, axis=1)
+    return np.asarray(((sums[0][match] == sums[1]) & same)[polygon])
+
+
+def _groups(count: int, first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(count,) a number from 0 for each of the items that pairs join."""
+    label = np.arange(count)
+    while (label[first] != label[second]).any():
+        least = np.minimum(label[first], label[second])
+        for side in (first, second):
+            np.minimum.at(label, label[side], least)
+        label = label[label]
+    while (label != label[label]).any():
+        label = label[label]
+    return np.asarray(np.unique(label, return_inverse=True)[1])
+
+
+def _marks(start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """A number of 64 bits for each directed edge, as if drawn at random (Steele et al. 2014)."""
+    mark = start.astype(np.uint64) << np.uint64(32) | end.astype(np.uint64)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        mark = (mark ^ mark >> np.uint64(shift)) * np.uint64(factor)
+    return mark ^ mark >> np.uint64(31)
 
 
 def stray_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.faces import keep_faces
+
+from .conftest import read_source
 
 POINTS = np.array(
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0, 0], [1, 0, 0], [np.nan, 0, 0], [9, 9, 9]],
@@ -108,3 +114,67 @@ def test_counts_do_not_depend_on_order(faces: list[tuple[int, int, int]], order)
     order.shuffle(shuffled)
     again = keep_faces(points, np.array(shuffled, dtype=np.int64))
     assert (len(again.source), again.paired.sum()) == (len(seen), result.paired.sum())
+
+
+def test_two_sided_walls_of_the_case(shared: Path) -> None:
+    """Four walls of two quads: whatever the order of the corners, each side has its own."""
+    path = shared / "cases/twosided-obj/m.obj"
+    source = read_source(path)
+    wall = np.array([name in "nswe" for name in source.objects])[source.triangle_object]
+    result = keep_faces(source.points, source.triangles)
+    assert result.paired.tolist() == wall[result.source].tolist()
+    scene = ingest(path, IngestOptions(unit="m", up="y"))
+    assert (~scene.two_sided).tolist() == wall.tolist()
+    (note,) = [n for n in scene.notes if "opposite winding" in n.message]
+    assert note.count == 8
+
+
+def fan(corners: list[int], first: int) -> list[list[int]]:
+    turned = corners[first:] + corners[:first]
+    return [[turned[0], a, b] for a, b in pairwise(turned[1:])]
+
+
+OUTLINE = np.array([[0, 0, 0], [3, 0, 0], [5, 2, 0], [4, 5, 0], [1, 5, 0], [-1, 2, 0]], float)
+#: Neighbours in the plane, and a wall that meets it in one of its edges.
+BESIDE = np.array([[3, 0, 9], [0, 0, 9], [9, -1, 0], [9, 9, 0]], float)
+
+
+@pytest.mark.parametrize("angle", [0, 0.3, 2])
+@pytest.mark.parametrize("first", range(6))
+@pytest.mark.parametrize("second", range(6))
+def test_polygons_are_paired_however_they_are_cut(first: int, second: int, angle: float) -> None:
+    """Their neighbours, of which one side has more, change nothing."""
+    ring = list(range(6))
+    front, back = fan(ring, first), fan(ring[::-1], second)
+    more = [[1, 0, 6], [1, 6, 7], [1, 8, 2], [2, 8, 9]]
+    c, s = np.cos(angle), np.sin(angle)
+    points = np.concatenate([OUTLINE, BESIDE]) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    result = kept(front + back + more, points)
+    assert result.paired.tolist() == [True] * 8 + [False] * 4
+
+
+def test_what_is_no_opposite_polygon() -> None:
+    """The same winding, another outline, a bent quad, and a lid over a bowl of the same rim."""
+    ring = list(range(6))
+    assert not kept(fan(ring, 0) + fan(ring, 1), OUTLINE).paired.any()
+    assert not kept(fan(ring, 0) + fan(ring[:0:-1], 1), OUTLINE).paired.any()
+    bent = OUTLINE[:4] + np.array([[0, 0, 0], [0, 0, 0.1], [0, 0, 0], [0, 0, 0]])
+    assert not kept(fan(ring[:4], 0) + fan(ring[3::-1], 0), bent).paired.any()
+    bowl = np.concatenate([OUTLINE, [[2, 2, -1]]])
+    sides = [[6, (k + 1) % 6, k] for k in ring]
+    assert not kept(fan(ring, 0) + sides, bowl).paired.any()
+    flat = np.concatenate([OUTLINE, [[2, 2, 0]]])
+    assert kept(fan(ring, 0) + sides, flat).paired.all()
+
+
+def test_a_floor_of_many_tiles_is_paired() -> None:
+    """Each tile with the one below it, cut along the other diagonal."""
+    n = 40
+    x, y = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    points = np.stack([x, y, 0 * x], axis=1).astype(float)
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)
+    above = np.concatenate([first + [0, n + 1, n + 2], first + [0, n + 2, 1]])
+    below = np.concatenate([first + [0, 1, n + 1], first + [1, n + 2, n + 1]])
+    faces = np.concatenate([above, below[:-1]])
+    result = keep_faces(points, faces)
+    assert result.paired.sum() == len(faces) - 3
