@@ -27,7 +27,7 @@ NEEDED = (
     ("IFC", "ifcopenshell", "'ptmtools[ifc]'"),
 )
 #: Formats that say their unit and axis.
-SAYS = ("glTF", "USD", "IFC")
+SAYS = ("glTF", "USD", "IFC", "COLLADA", "VRML, X3D")
 
 
 @pytest.mark.parametrize(

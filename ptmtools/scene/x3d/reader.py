@@ -1,7 +1,7 @@
 """Reads VRML97 and X3D models into a `ModelSource`.
 
 pymeshlab is not used because it loses objects and materials, and which face has which image, and
-reads none of the primitives. No library of the registry reads VRML97 with materials.
+reads no boxes or other solids; trimesh knows neither format.
 
 A model may consist of many files (Inline), each of which is parsed once. Sensors, scripts,
 interpolators, sounds and backgrounds have no effect.

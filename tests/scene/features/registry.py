@@ -46,7 +46,7 @@ class Feature:
 
 FEATURES: list[Feature] = []
 #: The modules beside this one, each with the features of one format.
-FORMS = ("obj", "gltf", "ply", "usd", "ifc")
+FORMS = ("obj", "gltf", "ply", "usd", "ifc", "collada", "x3d")
 
 
 def glossy(scene: Scene) -> None:
