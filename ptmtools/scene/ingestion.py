@@ -184,7 +184,7 @@ def clean_faces(draft: Draft) -> None:
 def find_space(draft: Draft) -> None:
     """Settles unit and up axis. Raises as `settle`."""
     source, kept, row = draft.source, draft.kept, draft.format
-    options = draft.options
+    options, up = draft.options, row.up or source.up
     named = NamedFaces.from_names(
         (source.objects, source.triangle_object[kept.source]),
         ([material.name for material in source.materials], source.triangle_material[kept.source]),
@@ -196,9 +196,10 @@ def find_space(draft: Draft) -> None:
         DeclaredSpace(None if options.unit is None else parse_unit(options.unit), options.up),
         DeclaredSpace(
             row.metres or source.metres,
-            row.up or source.up,
+            up,
             prescribed=row.metres is not None,
             usual_up=row.usual_up,
+            rooms=tuple(float(np.ptp(room.points[:, 1 + (up == "z")])) for room in source.rooms),
         ),
         draft.notes,
         ask=draft.ask,

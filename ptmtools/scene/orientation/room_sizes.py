@@ -80,12 +80,13 @@ class RoomSizes:
     ----------
     visitors: heights of the tallest visitor at the places in rooms: `QUANTILES` quantiles by
         volume, ascending; none if the model has no rooms.
-    heights: quantiles of the clear heights, of the places with a ceiling if at least `_ROOFED` of
-        the rooms have one.
+    heights: quantiles of the clear heights, of the places with a ceiling if ``roofed``.
+    roofed: whether at least `_ROOFED` of the rooms have a ceiling.
     """
 
     visitors: tuple[float, ...] = ()
     heights: tuple[float, ...] = ()
+    roofed: bool = False
 
     @property
     def storey(self) -> tuple[float, float]:
@@ -105,6 +106,7 @@ class RoomSizes:
         return RoomSizes(
             tuple(height * scale for height in self.visitors),
             tuple(height * scale for height in self.heights),
+            self.roofed,
         )
 
 
@@ -159,11 +161,12 @@ def room_sizes(
     if not total > _ROOMS * volume[closed].sum():
         return NO_ROOMS
     body = np.minimum(height, width * (HEIGHT / (2 * RADIUS)))
-    counted = rooms & roofed
-    if volume[counted].sum() < _ROOFED * total:
-        counted = rooms
+    ceiling = bool(volume[rooms & roofed].sum() >= _ROOFED * total)
+    counted = rooms & roofed if ceiling else rooms
     return RoomSizes(
-        _quantiles(body[rooms], volume[rooms]), _quantiles(height[counted], volume[counted])
+        _quantiles(body[rooms], volume[rooms]),
+        _quantiles(height[counted], volume[counted]),
+        ceiling,
     )
 
 

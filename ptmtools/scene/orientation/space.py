@@ -7,17 +7,19 @@ knows which of them the model was viewed in.
 
 The user is asked for the unit (PTM-I236) if no guess is possible: where no visitor can stand in the
 rooms in any unit, as in a model of extent 1. A unit that the file records is not questioned, only
-doubted. A unit that the format prescribes is: many exporters write the units of their program
-instead. So the user is asked too where no visitor can stand in the rooms of a glTF file, and where
-most rooms are higher than any and another unit explains them. Models without floors between walls,
-such as statues, terrains and caves, have no rooms to judge by; they are never refused.
+doubted, and that of an IFC file is judged by its spaces. A unit that the format prescribes is
+questioned: many exporters write the units of their program instead. Where no visitor can stand in
+the rooms of a glTF file, or most rooms are higher than any and another unit explains them, the one
+unit with a name in which the rooms have a usual height is taken, with a warning; if there are
+several or none, the user is asked. Models without floors between walls, such as statues, terrains
+and caves, have no rooms to judge by; they are never refused.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +28,14 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene.model import Space
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.orientation.room_sizes import HEIGHT
+from ptmtools.scene.orientation.room_sizes import HEIGHT, RoomSizes
 from ptmtools.scene.orientation.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
     CONVENTION,
     DOUBT_AXIS,
+    LEAD,
+    STOREY,
     TRUST,
     UNITS,
     Candidate,
@@ -44,6 +48,7 @@ from ptmtools.scene.orientation.up_axis import (
 
 #: Largest number of reasons in a note.
 _REASONS = 3
+_OVERRIDE = "use --unit to override"
 #: Number of units from which the user may choose.
 _CHOICE = 3
 #: Extent of a scene in metres, from a micrometre to a million kilometres: beyond it the unit is
@@ -77,12 +82,14 @@ class DeclaredSpace:
     metres, up: the length of one unit and the up axis, if they are declared.
     prescribed: the format prescribes the unit for all files instead of recording it in this one.
     usual_up: the up axis by convention, which counts only where none is declared.
+    rooms: the clear heights of the rooms that the model has by name, in its units.
     """
 
     metres: float | None = None
     up: Up | None = None
     prescribed: bool = False
     usual_up: Up | None = None
+    rooms: tuple[float, ...] = ()
 
 
 def settle(
@@ -108,6 +115,9 @@ def settle(
         raise LimitError("PTM-L204", "coordinates are too large for float64", file=notes.model)
     if by_user.metres is None or by_user.up is None:
         measured = evidence(points, triangles, named)
+        if by_format.up and (heights := tuple(sorted(by_format.rooms))):
+            rooms = RoomSizes(heights, heights, roofed=True)
+            measured[by_format.up] = replace(measured[by_format.up], rooms=rooms)
         metres, up = _judge(measured, by_user, by_format, notes, ask=ask)
     else:
         metres, up = by_user.metres, by_user.up
@@ -127,7 +137,7 @@ def settle(
         (x, y, z),
         metres,
         up,
-        unit_guessed=not (by_user.metres or by_format.metres),
+        unit_guessed=metres not in (by_user.metres, by_format.metres),
         up_guessed=not (by_user.up or by_format.up),
     )
 
@@ -151,14 +161,15 @@ def _judge(
     up = by_user.up or by_format.up or judged
     if by_user.metres is not None:
         return by_user.metres, up
-    every = candidates(measured, usual=usual, numbers=True)
+    every = candidates(measured, usual=usual, numbers=True, stated=by_format.metres)
     ranked = [candidate for candidate in every if candidate.up == up]
     if by_format.metres is None:
         return _guess_unit(ranked, notes, ask), up
-    given = candidates(measured, by_format.metres, usual)
-    likely = next(c for c in every if c.up == judged and c.unit in UNITS)
-    stated = next(candidate for candidate in given if candidate.up == up)
-    return _judge_unit(stated, likely, ranked, by_format.prescribed, notes, ask), up
+    # Units without a name follow from the rooms alone, unless doors confirm them.
+    likely = next(
+        c for c in every if c.up == judged and (c.unit in UNITS or c.stated or c.evidence.door)
+    )
+    return _judge_unit(likely, ranked, by_format.prescribed, notes, ask), up
 
 
 def _judge_axis(ranked: list[Candidate], by_format: Up | None, notes: IngestNotes) -> Up:
@@ -170,7 +181,9 @@ def _judge_axis(ranked: list[Candidate], by_format: Up | None, notes: IngestNote
     for_best, for_rival = _reasons(best, rival), _reasons(rival, best)
     if by_format:
         # A plan has no rooms that could lie on their side.
-        if best.up == by_format or lead < DOUBT_AXIS or best.flat:
+        low, high = (height / rival.metres for height in STOREY)
+        one_storey = low <= rival.evidence.height <= high
+        if best.up == by_format or lead < DOUBT_AXIS or best.flat or one_storey:
             return by_format
         if lead < CLOSE_AXIS:
             notes.note(
@@ -237,32 +250,32 @@ def _guess_unit(ranked: list[Candidate], notes: IngestNotes, ask: bool) -> float
 
 
 def _judge_unit(
-    given: Candidate,
-    likely: Candidate,
-    ranked: list[Candidate],
-    prescribed: bool,
-    notes: IngestNotes,
-    ask: bool,
+    likely: Candidate, ranked: list[Candidate], prescribed: bool, notes: IngestNotes, ask: bool
 ) -> float:
-    """Metres in the given unit of the format, with a note if it is doubtful; the user is asked if
-    the format prescribes it and it is impossible."""
+    """Metres in the unit that the format states, with a note if it is doubtful. If the format
+    prescribes it and it is impossible, the one possible unit with a name, with a note; without one
+    the user is asked."""
+    given = next(candidate for candidate in ranked if candidate.stated)
     unit = "metres" if given.metres == 1 else f"units of {given.metres:g} m"
-    too_high = given.too_high and given.cost - ranked[0].cost > TRUST
-    if prescribed and (given.too_low or too_high):
-        _ask(f"the format is in {unit}, but the model can hardly be", given, ranked, notes, ask)
-    elif given.too_low:
-        notes.note(
-            "PTM-N227",
-            f"the file is in {unit} ({given.size}), but its rooms are too small for a visitor "
-            f"{HEIGHT:g} m tall; use --unit to override",
-        )
-    # Units without a name are not among the candidates.
-    elif given.unit in UNITS and likely.metres != given.metres:
-        notes.note(
-            "PTM-N227",
-            f"the format is in {unit}, but {likely.unit} is more likely ({likely.size}); use "
-            "--unit to override",
-        )
+    hardly = given.cost - ranked[0].cost > TRUST[not prescribed]
+    if prescribed and (given.too_low or (given.too_high and hardly)):
+        usual = [c for c in ranked if c.unit in UNITS and c.usual]
+        if len(usual) != 1 or usual[0].cost > given.cost:
+            _ask(f"the format is in {unit}, but the model can hardly be", given, ranked, notes, ask)
+            return given.metres
+        text = f"can hardly be ({given.size}): assuming {usual[0].unit} ({usual[0].size})"
+        notes.note("PTM-N227", f"the format is in {unit}, but the model {text}; {_OVERRIDE}")
+        return usual[0].metres
+    close = LEAD if prescribed and given.evidence.rooms.roofed else CLOSE_UNIT
+    if given.too_low and hardly:
+        text = f"its rooms are too small for a visitor {HEIGHT:g} m tall"
+        notes.note("PTM-N227", f"the file is in {unit} ({given.size}), but {text}; {_OVERRIDE}")
+    elif given.small and not given.evidence.rooms.heights:
+        text = f"the model is lower than a visitor {HEIGHT:g} m tall ({given.size}); {_OVERRIDE}"
+        notes.note("PTM-N233", f"the unit is uncertain: in {unit}, {text}")
+    elif likely.metres != given.metres and given.cost - likely.cost > close:
+        text = f"{likely.unit} is more likely ({likely.size}); use --unit {likely.unit} to override"
+        notes.note("PTM-N227", f"the format is in {unit}, but {text}")
     return given.metres
 
 

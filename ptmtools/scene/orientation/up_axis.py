@@ -46,12 +46,14 @@ AXES: dict[Up, int] = {"y": 1, "z": 2}
 #: Faces whose normal is within 8 degrees of the up axis are level; faces whose normal is within 3
 #: degrees of perpendicular to it are upright.
 _LEVEL, _UPRIGHT = 0.99, 0.05
+#: Floors and walls of rooms lean less than 26 and 17 degrees, in scans too.
+_FLOOR, _WALL = 0.9, 0.3
 #: Relative difference of free heights that count as equal.
 _SAME = 0.1
 #: Words, or their beginnings, in names of objects and materials.
 _LEVEL_NAMES = ("floor", "ceiling", "slab", "boden", "decke", "plafond", "suelo", "pavimento")
 _UPRIGHT_NAMES = ("wall", "wand", "mur", "pared", "parete")
-_DOOR_NAMES = ("door", "tür", "tuer", "porte", "puerta", "porta")
+_DOOR_NAMES = ("door", "tür", "tuer", "porte", "puerta", "porta", "refrigerator", "fridge")
 #: Largest number of doors whose height is measured.
 _DOORS = 64
 #: Smallest share of the model's area with names that count as evidence.
@@ -61,7 +63,7 @@ _NAMED = 0.05
 @dataclass(frozen=True)
 class NamedFaces:
     """The faces whose names state their orientation: (T,) level, (T,) upright, and the triangles of
-    each door leaf."""
+    each door leaf, or refrigerator, which is as high."""
 
     level: Bools
     upright: Bools
@@ -176,8 +178,8 @@ def evidence(
             rooms=room_sizes(
                 lines,
                 crossings,
-                np.abs(normals[axis][:, axis]) > _LEVEL,
-                [np.abs(unit[:, axis]) < _UPRIGHT for unit in normals],
+                np.abs(normals[axis][:, axis]) > _FLOOR,
+                [np.abs(unit[:, axis]) < _WALL for unit in normals],
                 axis,
             ).times(scale),
         )
@@ -250,7 +252,7 @@ RUNNER_UP = 3.0
 #: building has several storeys, which costs little.
 HEIGHTS = (2.0, 15.0)
 #: Widths of buildings and clear heights of rooms, in metres.
-WIDTHS, ROOMS = (3.0, 500.0), (2.2, 6.0)
+WIDTHS, ROOMS = (3.0, 500.0), (2.1, 6.0)
 #: The cost of a room grows with the logarithm of its height up to the first cost, then with this
 #: share of it: halls and blocks of a city may have any height.
 HALL, HIGHER = 0.5, 0.2
@@ -258,8 +260,8 @@ HALL, HIGHER = 0.5, 0.2
 #: the rest may lie in furniture and slabs.
 NO_VISITOR, ENOUGH = 4.0, 0.5
 #: Rooms are impossible if a visitor fits at a smaller share of places than this, or if half of them
-#: are higher than this, in metres.
-FEWEST, HIGHEST = 0.4, 200.0
+#: have a ceiling higher than the first height, in metres, or end above the second.
+FEWEST, HIGHEST = 0.4, (40.0, 200.0)
 #: Clear heights of most rooms in metres, of houses and of halls, from which units without a name
 #: follow; the prior cost of such a unit; and its smallest ratio to every unit with a name.
 STOREYS, NUMBER, UNLIKE = (2.7, 5.0), 1.0, 1.5
@@ -275,8 +277,14 @@ CLOSE_AXIS, CLOSE_UNIT = 0.5, 0.4
 #: An axis defined by the format is doubtful if the other axis costs this much less: more than the
 #: difference for a correct corridor or cube that would be cheaper on its side.
 DOUBT_AXIS = 0.35
-#: A unit prescribed by the format is impossible only if another one costs this much less.
-TRUST = 1.5
+#: A unit that the format prescribes, and one that the file records, is impossible only if another
+#: one costs this much less.
+TRUST = 0.5, 1.5
+#: Another unit than a prescribed one, in which rooms have ceilings, is likelier if it costs this
+#: much less; of others `CLOSE_UNIT`.
+LEAD = 0.1
+#: Heights of a storey, metres: a model as high does not lie on its side if its format says so.
+STOREY = 2.0, 4.0
 #: Smallest difference of costs that counts as a reason.
 _REASON = 0.1
 _OTHER: dict[Up, Up] = {"y": "z", "z": "y"}
@@ -292,6 +300,7 @@ class Candidate:
     unit: its name; the length in metres if it has none.
     evidence: of the model with this axis up.
     costs: by criterion; the keys are the reasons in messages.
+    stated: whether the format states this unit.
     """
 
     up: Up
@@ -299,6 +308,7 @@ class Candidate:
     unit: str
     evidence: Evidence
     costs: Mapping[str, float]
+    stated: bool = False
 
     @property
     def cost(self) -> float:
@@ -327,14 +337,21 @@ class Candidate:
 
     @property
     def too_low(self) -> bool:
-        """Whether no visitor can stand in its rooms, if it has rooms."""
-        return self.evidence.rooms.share(HEIGHT / self.metres) < FEWEST
+        """Whether no visitor can stand in its rooms, if any, or under the ceilings of most."""
+        rooms, least = self.evidence.rooms, HEIGHT / self.metres
+        return rooms.share(least) < FEWEST or (rooms.roofed and rooms.storey[0] < least)
+
+    @property
+    def usual(self) -> bool:
+        """Whether most of its rooms are of a height that rooms and halls may well have."""
+        return HEIGHT <= self.evidence.storey[0] * self.metres <= 2 * STOREYS[1]
 
     @property
     def too_high(self) -> bool:
         """Whether its rooms are higher than any."""
-        heights = self.evidence.rooms.heights
-        return bool(heights) and heights[len(heights) // 2] > HIGHEST / self.metres
+        rooms = self.evidence.rooms
+        highest = HIGHEST[not rooms.roofed] / self.metres
+        return bool(rooms.heights) and rooms.heights[len(rooms.heights) // 2] > highest
 
     def rivals(self, best: Candidate) -> bool:
         """Whether its cost is low enough to print it as the second-best guess."""
@@ -354,23 +371,27 @@ def candidates(
     usual: Up | None = None,
     *,
     numbers: bool = False,
+    stated: float | None = None,
 ) -> list[Candidate]:
     """The candidates for the evidence of each axis, the most likely first: for every unit, or for
     one of ``metres``. ``usual`` is the up axis by convention. With ``numbers`` also units
-    without a name, in which the rooms have a usual height."""
+    without a name, in which the rooms have a usual height. ``stated`` is the unit that the format
+    states, of which no prior cost is known."""
     names = {length: name for name, length in UNITS.items()}
     units = UNITS if metres is None else {names.get(metres, f"{metres:g}"): metres}
     result = []
     for up, sides in measured.items():
         extra = {f"{length:g}": length for length in _fitting_units(sides) if numbers}
+        if stated is not None:
+            extra[names.get(stated, f"{stated:g}")] = stated
         for unit, length in (units | extra).items():
             costs = _costs(sides, measured[_OTHER[up]], length)
             if metres is None:
                 # Says nothing on the axis: that with no rooms has no rooms that are too low.
                 costs["room for a visitor"] = _visitor_cost(sides.rooms, length)
-                costs["usual unit"] = PRIOR.get(unit, NUMBER)
+                costs["usual unit"] = 0.0 if length == stated else PRIOR.get(unit, NUMBER)
             costs[CONVENTION] = UNUSUAL_UP * (usual not in (None, up))
-            result.append(Candidate(up, length, unit, sides, costs))
+            result.append(Candidate(up, length, unit, sides, costs, length == stated))
     # Rounded, so that the last digits of coordinates decide nothing between equals.
     return sorted(result, key=lambda candidate: round(candidate.cost, 6))
 
@@ -379,10 +400,11 @@ def _fitting_units(measured: Evidence) -> list[float]:
     """The units in which most rooms have a usual height, without those similar to one with a
     name."""
     height, _ = measured.rooms.storey
-    fitting = [float(f"{storey / height:.2g}") for storey in STOREYS] if height > 0 else []
+    fitting = [storey / height for storey in STOREYS] if height > 0 else []
+    fitting += [DOOR / measured.door] if measured.door > 0 else []
     return [
         metres
-        for metres in fitting
+        for metres in (float(f"{length:.2g}") for length in fitting)
         if 0 < metres < math.inf
         and all(abs(_log_ratio(metres, unit)) > math.log(UNLIKE) for unit in UNITS.values())
     ]

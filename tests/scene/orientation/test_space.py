@@ -207,15 +207,30 @@ def test_gltf_in_metres_is_not_questioned(name: str) -> None:
     assert not {"PTM-N227", "PTM-N236"} & notes.keys()
 
 
-@pytest.mark.parametrize("name", ["house", "museum", "serpentine", "flat"])
-@pytest.mark.parametrize("unit", ["cm", "mm"])
-def test_gltf_with_rooms_of_270_metres_is_questioned(name: str, unit: str) -> None:
-    large = y_up(BUILDINGS[name]) / UNITS[unit]
-    with pytest.raises(InputError, match=f"PTM-I236.*|--unit {unit}") as caught:
+@pytest.mark.parametrize("name", ["house", "serpentine", "flat"])
+def test_gltf_with_rooms_of_270_metres_is_questioned(name: str) -> None:
+    """They may be 2.7 m high, in centimetres, or 6.9 m, in inches."""
+    large = y_up(BUILDINGS[name]) / UNITS["cm"]
+    with pytest.raises(InputError, match="PTM-I236") as caught:
         settled(large, by_format=GLTF)
     offers = re.findall(r"--unit (\S+) \(", str(caught.value.remedy))
-    assert offers[0] == unit
+    assert offers[:2] == ["cm", "in"]
     assert "m" in offers
+    assert settled(large, DeclaredSpace(1.0), GLTF)[0].metres == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("museum", "cm"), *((name, "mm") for name in ("house", "museum", "serpentine", "flat"))],
+)
+def test_gltf_in_an_obvious_unit_is_taken_with_a_warning(name: str, unit: str) -> None:
+    """In no other are the rooms 1.7 to 10 m high."""
+    large = y_up(BUILDINGS[name]) / UNITS[unit]
+    space, notes = settled(large, by_format=GLTF)
+    assert (space.metres, list(notes)) == (UNITS[unit], ["PTM-N227"])
+    assert f"can hardly be ({_width(large):.3g} m wide" in notes["PTM-N227"]
+    assert f"assuming {unit} ({_width(large) * UNITS[unit]:.3g} m wide" in notes["PTM-N227"]
+    assert notes["PTM-N227"].endswith("use --unit to override")
     assert settled(large, DeclaredSpace(1.0), GLTF)[0].metres == 1.0
 
 
