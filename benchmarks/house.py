@@ -42,7 +42,7 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (71_733, 350),
+    "ptmtools": (71_753, 350),
     "ptmtools/*.py": (4_150, 26),
     "ptmtools/cells": (8_325, 28),
     "ptmtools/cli": (3_110, 15),
@@ -53,7 +53,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/pipeline": (4_050, 20),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (2_040, 13),
-    "ptmtools/scene": (11_842, 60),
+    "ptmtools/scene": (11_862, 60),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_640, 25),

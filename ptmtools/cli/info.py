@@ -221,7 +221,7 @@ def _info_model(console: Console, target: str, options: IngestOptions) -> None:
 def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tuple[str, str]]:
     """The headings and texts of the description of a model; with ``every`` object, image, door and
     note."""
-    from ptmtools.scene.notes import line, warnings
+    from ptmtools.scene.notes import lines, warnings
 
     def some(names: list[str]) -> str:
         shown = names if every else names[:_SHOWN]
@@ -255,8 +255,8 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
         yield "rooms", f"{len(scene.rooms)}: {some([r.name or 'unnamed' for r in scene.rooms])}"
     for warning in warnings(scene.notes):
         yield "warning", warning
-    for note in scene.notes if every else ():
-        yield "note", line(note)
+    for note in lines(scene.notes) if every else ():
+        yield "note", note
 
 
 def _size(scene: Scene) -> list[float]:

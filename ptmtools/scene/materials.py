@@ -177,7 +177,7 @@ def _material(
         if holes is not None and not (transparent or material.ignores_alpha):
             transparent = uses_holes(holes, uv, *wraps)
     if material.opacity == 0:
-        notes.note("PTM-N211", f"material {material.name} is invisible (opacity 0)")
+        notes.note("PTM-N211", f"material {material.name}: invisible (opacity 0)")
     return Material(
         name=material.name,
         color=material.color or (PLAIN if image < 0 else WHITE),

@@ -174,6 +174,14 @@ def line(note: Note, more: int = 0) -> str:
     return f"{where}{note.message}{times}{others} [{note.code}]"
 
 
+def lines(notes: Iterable[Note]) -> list[str]:
+    """The text of notes, one line for those that differ by a name before a colon only."""
+    alike: dict[tuple[str, str], list[Note]] = {}
+    for note in notes:
+        alike.setdefault((note.code, note.message.split(": ", 1)[-1]), []).append(note)
+    return [line(group[0], len(group) - 1) for group in alike.values()]
+
+
 def warnings(notes: Iterable[Note]) -> Iterator[str]:
     """The text of the warnings among some notes, one line for each code but those of `EACH`."""
     by_code: dict[str, list[Note]] = {}

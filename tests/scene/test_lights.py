@@ -97,7 +97,7 @@ def test_a_lamp_that_the_model_does_not_define(put: Put) -> None:
     use = {"KHR_lights_punctual": {"light": 0}}
     scene = ingest(put("lamp.glb", GltfModel.wall(extensions=use).glb()))
     assert not scene.lights
-    assert ("PTM-N215", "node 0") in noted(scene)
+    assert ("PTM-N215", "node wall") in noted(scene)
 
 
 def test_large_numbers_are_clipped(put: Put, textured: Callable[..., Path]) -> None:

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from ptmtools.scene.model import Note
-from ptmtools.scene.notes import WARNINGS, line, warnings
+from ptmtools.scene.notes import WARNINGS, line, lines, warnings
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -43,3 +43,14 @@ def test_the_docs_list_the_same_warnings() -> None:
         for first, _, last in re.findall(r"N(\d+)( to N(\d+))?", row):
             actual |= {f"PTM-N{n}" for n in range(int(first), int(last or first) + 1)}
     assert actual == set(WARNINGS)
+
+
+def test_notes_that_differ_by_a_name_are_one_line() -> None:
+    given = [Note("PTM-N215", "morph targets dropped", f"mesh {name}") for name in ("a", "b", "c")]
+    given += [Note("PTM-N211", f"{name}: invisible (opacity 0)") for name in ("glass", "air")]
+    given += [Note("PTM-N211", "duplicate faces dropped", "", 52)]
+    assert lines(given) == [
+        "mesh a: morph targets dropped, and 2 more like it [PTM-N215]",
+        "glass: invisible (opacity 0), and 1 more like it [PTM-N211]",
+        "duplicate faces dropped (52 times) [PTM-N211]",
+    ]

@@ -240,7 +240,7 @@ class SceneStage(Stage["Scene"]):
         self, run: Run, options: IngestOptions, transaction: Transaction, work: StageRecord
     ) -> StageRecord:
         from ptmtools.scene import ingest
-        from ptmtools.scene.notes import line, warnings
+        from ptmtools.scene.notes import lines, warnings
 
         model = _model_of(run)
         scene = ingest(model, options, run.progress, workers=run.workers.here)
@@ -254,7 +254,7 @@ class SceneStage(Stage["Scene"]):
             work,
             inputs=_digests(model, scene.files, run.db.digests),
             counts={**self.counts(scene), **_bytes(model, scene.files, scene.images)},
-            notes=tuple(map(line, scene.notes)),
+            notes=tuple(lines(scene.notes)),
             warnings=tuple(warnings(scene.notes)),
         )
 

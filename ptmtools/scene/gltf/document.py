@@ -145,6 +145,11 @@ class GltfDocument:
         return elements(accessor, self.tree["bufferViews"][view] | place, buffer.data)
 
 
+def place_of(kind: str, entry: dict[str, Any], index: int | None) -> str:
+    """The place of an entry of a list, by its name, else by its number."""
+    return f"{kind} {entry.get('name') or index}"
+
+
 def damage(path: Path, reason: str, place: str | None = None) -> InputError:
     """The error for a file that violates glTF 2.0, PTM-I249."""
     return InputError(

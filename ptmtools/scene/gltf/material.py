@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.gltf.compression import TranscodedBytes
-from ptmtools.scene.gltf.document import GltfDocument, data_uri
+from ptmtools.scene.gltf.document import GltfDocument, data_uri, place_of
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.options import FAULTS, fault_of
 from ptmtools.scene.source import (
@@ -108,20 +108,20 @@ class GltfMaterialReader:
         return self._uses[index, colored]
 
     def _read(self, entry: dict[str, Any], index: int | None, colored: bool) -> MaterialUse:
-        place = f"material {index}"
+        place = place_of("material", entry, index)
         name = str(entry.get("name") or ("default" if index is None else place))
         extensions = entry.get("extensions", {})
         factor, use = _base_color(entry)
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
-            self._notes.note("PTM-N215", f"{name}: colour factor converted to sRGB", place)
+            self._notes.note("PTM-N215", "colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         see_through = entry.get("alphaMode") in ("MASK", "BLEND")
         alpha = _alpha(entry, a)
         transmission, transmits = extensions.get("KHR_materials_transmission", {}), 0.0
         if transmission.get("transmissionFactor", 0) > 0:
-            self._notes.note("PTM-N215", f"{name}: transmits light, never occludes", place)
+            self._notes.note("PTM-N215", "transmits light, never occludes", place)
             see_through = True
             blended = alpha["opacity"] < 1 or not (alpha["ignores_alpha"] or use is None)
             if not (blended or "transmissionTexture" in transmission):
@@ -131,24 +131,24 @@ class GltfMaterialReader:
         placed: _Placed = None, "TEXCOORD_0", np.eye(2, 3), False
         if self._texture_of is not None:
             # The code of textures that are missing.
-            what = f"{name}: texture"
+            what = "texture"
             placed = self._optional("PTM-N204", what, place, self._other, entry) or placed
         elif use is not None:
             placed = self._place(use, place)
         elif max(red, green, blue) <= DARK and "emissiveTexture" in entry:
             # The image of its emission may become its texture.
-            what = f"{name}: coordinates of emission"
+            what = "coordinates of emission"
             known = self._optional("PTM-N215", what, place, self._emission_placement, entry)
             placed = (None, *known) if known else placed
         texture, coords, matrix, moved = placed
         if moved:
-            message = f"{name}: KHR_texture_transform baked into its faces"
+            message = "KHR_texture_transform baked into its faces"
             self._notes.note("PTM-N215", message, place)
         normal, normal_coords, normal_matrix = self._normal_texture(entry, name, place, placed)
         parts: dict[str, Any] = {}
         if self._texture_of is None:
             for what, read in (("emission", self._glow), ("metallic, roughness", self._matter)):
-                parts |= self._optional("PTM-N215", f"{name}: {what}", place, read, entry) or {}
+                parts |= self._optional("PTM-N215", what, place, read, entry) or {}
         self._materials.append(
             SourceMaterial(
                 name=name,
@@ -212,7 +212,7 @@ class GltfMaterialReader:
         matrix, None if they are those of the texture."""
         relief = None
         if self._normals and "normalTexture" in entry:
-            what = f"{name}: normal map"
+            what = "normal map"
             relief = self._optional("PTM-N215", what, place, self._normal, entry)
         if relief is None:
             return None, None, None
@@ -273,11 +273,12 @@ class GltfMaterialReader:
         sources = [texture, *texture.get("extensions", {}).values()]
         # The image without an extension has the least loss.
         source = next((entry["source"] for entry in sources if "source" in entry), None)
-        what = f"texture {index}"
         if source is None:
+            what = place_of("texture", texture, index)
             self._notes.miss("PTM-N204", f"{what}: has no image", place)
             return None
         image = tree["images"][source]
+        what = place_of("image", image, source)
         uri = image.get("uri")
         label = str(image.get("name") or f"image_{source}")
         if "bufferView" in image:

@@ -15,7 +15,7 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.glb import natural
 from ptmtools.scene.colors import luminance
-from ptmtools.scene.gltf.document import GltfDocument
+from ptmtools.scene.gltf.document import GltfDocument, place_of
 from ptmtools.scene.gltf.material import finite
 from ptmtools.scene.lights import MOST, Lamp, LampKind
 from ptmtools.scene.model import Camera
@@ -49,7 +49,9 @@ def world_matrices(tree: dict[str, Any], notes: IngestNotes) -> dict[int, Floats
         entry = nodes[node]
         visibility = entry.get("extensions", {}).get("KHR_node_visibility", {})
         if visibility.get("visible", True) is False:
-            notes.note("PTM-N215", "invisible, dropped with its children", f"node {node}")
+            notes.note(
+                "PTM-N215", "invisible, dropped with its children", place_of("node", entry, node)
+            )
             continue
         with np.errstate(all="ignore"):
             world[node] = parent @ _local_matrix(entry)
@@ -136,7 +138,9 @@ def cameras(
         definition = tree["cameras"][entry["camera"]]
         name = str(entry.get("name") or definition.get("name") or f"camera {len(result)}")
         yfov = definition.get("perspective", {}).get("yfov", 0.0)
-        result += notes.camera(name, f"node {node}", matrix[:3, 3], -matrix[:3, 2], yfov)
+        result += notes.camera(
+            name, place_of("node", entry, node), matrix[:3, 3], -matrix[:3, 2], yfov
+        )
     return tuple(result)
 
 
@@ -152,13 +156,14 @@ def lamps(tree: dict[str, Any], world: dict[int, Floats], notes: IngestNotes) ->
         use = tree["nodes"][node].get("extensions", {}).get(_LIGHTS)
         if use is None:
             continue
+        place = place_of("node", tree["nodes"][node], node)
         try:
             lamp = _lamp(tree["extensions"][_LIGHTS]["lights"][natural(use["light"])], matrix)
         except FAULTS as fault:
-            notes.note("PTM-N215", f"lamp left out: {fault_of(fault)}", f"node {node}")
+            notes.note("PTM-N215", f"lamp left out: {fault_of(fault)}", place)
             continue
         if lamp.intensity > MOST:
-            notes.note("PTM-N215", f"intensity of a lamp reduced to {MOST:g}", f"node {node}")
+            notes.note("PTM-N215", f"intensity of a lamp reduced to {MOST:g}", place)
             lamp = replace(lamp, intensity=MOST)
         if lamp.intensity:
             result.append(lamp)

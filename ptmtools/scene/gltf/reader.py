@@ -28,6 +28,7 @@ from ptmtools.scene.gltf.document import (
     damage,
     document_json,
     open_document,
+    place_of,
 )
 from ptmtools.scene.gltf.material import GltfMaterialReader, MaterialUse, TextureOf
 from ptmtools.scene.gltf.nodes import cameras, instance_count, instances, lamps, world_matrices
@@ -187,10 +188,10 @@ def _draws(document: GltfDocument, node: int, notes: IngestNotes) -> Iterator[_D
     mesh = tree["meshes"][entry["mesh"]]
     name = str(entry.get("name") or mesh.get("name") or f"node {node}")
     if "skin" in entry:
-        notes.note("PTM-N215", "skin drawn in its rest pose", f"node {node}")
+        notes.note("PTM-N215", "skin drawn in its rest pose", place_of("node", entry, node))
     count = instance_count(document, node)
     for k, primitive in enumerate(mesh["primitives"]):
-        place = f"mesh {entry['mesh']}, primitive {k}"
+        place = f"{place_of('mesh', mesh, entry['mesh'])}, primitive {k}"
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN):
             notes.note("PTM-N215", f"primitive of mode {mode} (points or lines), skipped", place)
