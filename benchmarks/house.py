@@ -42,9 +42,9 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (71_753, 350),
+    "ptmtools": (71_806, 350),
     "ptmtools/*.py": (4_150, 26),
-    "ptmtools/cells": (8_325, 28),
+    "ptmtools/cells": (8_376, 28),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
     "ptmtools/light": (3_395, 15),

@@ -8,16 +8,19 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats
+from ptmtools.arrays import Bools, Floats, areas, normals
 from ptmtools.cells.building import Building
 from ptmtools.cells.doors import DoorLeaf
+from ptmtools.cells.floors import ROOFED
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import DoorState
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.space import LEAST_PLACE, DividedSpace, UnreachedRoom
+from ptmtools.cells.space import LEAST_PLACE, DividedSpace, Standing, UnreachedRoom
+from ptmtools.cells.structure import Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.quantities import count
+from ptmtools.scene.model import Scene
 
 #: Number of objects, or places, that a note names.
 NAMED = 3
@@ -25,6 +28,8 @@ NAMED = 3
 MUCH = 0.1
 #: and above this share of the volume, unseen.
 MUCH_UNSEEN = 0.02
+#: Triangles that represent those that are lost.
+_LOST = 4096
 #: The note on a model without walkable floor.
 NO_PLACES = Warned(
     "the body of --walker fits on no floor, so visitors may be anywhere in the cells"
@@ -71,7 +76,7 @@ def space_notes(building: Building, space: DividedSpace) -> list[str]:
                 "named like a door but treated as a wall, because of its size or of no space on "
                 f"both sides: {_list(building.doors.unrecognised)}; --door NAME makes it a door"
             )
-    return notes + _unreached_notes(space, options.reach == "all", options.strict)
+    return notes + _unreached_notes(building, space)
 
 
 def _door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list[str]:
@@ -117,8 +122,9 @@ def viewpoint_notes(solid: Floats) -> list[str]:
     ]
 
 
-def _unreached_notes(space: DividedSpace, kept: bool, strict: bool) -> list[str]:
-    """Notes on unreachable rooms, ``kept`` or left out."""
+def _unreached_notes(building: Building, space: DividedSpace) -> list[str]:
+    """Notes on unreachable rooms, kept or left out."""
+    kept, strict = building.options.reach == "all", building.options.strict
     rooms, outside, place = space.beyond.rooms, space.beyond.outside, space.place
     fate = "cannot be reached from the viewpoint and is left out"
     if kept:
@@ -133,6 +139,9 @@ def _unreached_notes(space: DividedSpace, kept: bool, strict: bool) -> list[str]
         notes.append(f"{count(len(rest), 'more such area')}, {area:.1f} m² in total: {fate}")
     if rooms and kept:
         notes[0] += ", or --reach main to leave out all unreachable areas"
+        every = float(Standing.from_tree(space.tree, space.reached, building).place.sum())
+        if sum(room.place for room in rooms) > MUCH * every:
+            notes[0] = Warned(notes[0])
     if outside:
         notes.append(
             Warned(
@@ -171,11 +180,53 @@ def leaf_notes(cells: Cells, reached: Bools) -> list[str]:
     return notes
 
 
-def triangle_notes(triangles: int, pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
-    """The note on those of a number of triangles that have no piece in any cell."""
-    owned = pieces.source[np.any(owner >= 0, axis=1)]
-    lost = triangles - len(np.unique(owned))
-    return [f"{lost} triangles lie outside all cells and are never visible"] * (lost > 0)
+def triangle_notes(
+    scene: Scene, pieces: Pieces, owner: NDArray[np.int32], building: Building
+) -> list[str]:
+    """Notes on the triangles of a scene that have no piece in any cell; those are a loss that
+    bound a space where a body fits, neither the outside of the building nor a hollow.
+
+    Raises
+    ------
+    InputError: PTM-I305 if more than `MUCH` is lost under ``strict``.
+    """
+    lost = np.ones(len(scene.triangles), dtype=bool)
+    lost[pieces.source[np.any(owner >= 0, axis=1)]] = False
+    if not lost.any():
+        return []
+    notes = [f"{np.count_nonzero(lost)} triangles lie outside all cells and are never visible"]
+    if np.mean(lost) > MUCH:
+        corners = spread_over(scene.corners[lost], _LOST)
+        space = _spaces_before(corners, scene, building)
+        some = np.flatnonzero(np.isfinite(space[:, 0]))
+        share = np.mean(lost) * len(some) / len(corners)
+        if share > MUCH:
+            place = _triple(space[some[np.argmax(areas(corners[some]))]])
+            much = f"{share:.0%} of the triangles bound space that visitors do not reach"
+            remedy = f"use --viewpoint {place} to start there"
+            if building.options.strict:
+                remedy += ", or build without --strict"
+                raise InputError("PTM-I305", f"{much}, as around {place}", remedy=remedy)
+            notes.append(Warned(f"{much}, as around {place}; {remedy}"))
+    return notes
+
+
+def _spaces_before(corners: Floats, scene: Scene, building: Building) -> Floats:
+    """(n, 3) the middle of the way from each of (n, 3, 3) triangles to what it faces, NaN if that
+    is outside or a body does not fit there."""
+    walker, roofed = building.walker, building.doors.floor.roof_share >= ROOFED
+    facing, around = normals(corners), Surroundings(scene.corners, scene.tolerance)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    start = corners.mean(axis=1) + 2 * scene.tolerance.plane * facing
+    way = around.first(start, facing)[0]
+    some = np.flatnonzero(np.isfinite(way))
+    middle = start[some] + facing[some] * way[some, None] / 2
+    up, down = (around.first(middle, np.full(middle.shape, [0, y, 0.0]))[0] for y in (1.0, -1.0))
+    fits = (around.free_about(middle).min(axis=1) >= walker.radius) & (up + down >= walker.height)
+    fits &= around.enclose(middle, roofed)
+    result = np.full(start.shape, np.nan)
+    result[some[fits]] = middle[fits]
+    return result
 
 
 def undecided_notes(undecided: Mapping[str, int]) -> list[str]:

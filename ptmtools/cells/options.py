@@ -151,7 +151,9 @@ class SubdivideOptions:
         parse=_positions,
         basic=True,
     )
-    strict: bool = option(False, "Fail if more than a tenth of the walkable floor is left out.")
+    strict: bool = option(
+        False, "Fail if more than a tenth of the walkable floor or of the triangles is left out."
+    )
 
     def __post_init__(self) -> None:
         area, thickness, gain = self.wall_area, self.wall_thickness, self.gain

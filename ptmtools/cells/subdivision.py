@@ -138,7 +138,7 @@ def _cut_and_group(
     cells = assemble_cells(scene, building, space, pieces, owner, notes)
     name = np.append(compact_numbers(seen_from_places(cells, executor)), np.int32(-1))
     cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
-    outside = triangle_notes(len(scene.triangles), pieces, name[owner])
+    outside = triangle_notes(scene, pieces, name[owner], building)
     dropped = [*leaf_notes(cells, space.reached), *outside]
     cells = group_cells(replace(cells, notes=(*cells.notes, *dropped)), options, building.volumes)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]

@@ -45,7 +45,7 @@ class IngestOptions:
     strict: bool = option(
         False,
         "Fail on missing files, unknown materials, unreadable images and dropped faces, and if "
-        "more than a tenth of the walkable floor is left out.",
+        "more than a tenth of the walkable floor or of the triangles is left out.",
         basic=True,
     )
     allow_outside: bool = option(False, "Also read files outside the model's folder.")
