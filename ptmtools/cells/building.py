@@ -220,9 +220,9 @@ class Building:
         """(r,) whether visitors stand in each region of the places: a way leads there from a
         room."""
         structure, tolerance = self.structure, self.structure.tolerance
-        if self.options.standing != "places" or not len(self.places.plan):
-            return np.ones(len(self.places.plan), dtype=np.bool_)
         solid = structure.corners[~structure.door | (self.options.doors == "closed")]
+        if self.options.standing != "places" or not len(solid):
+            return np.ones(len(self.places.plan), dtype=np.bool_)
         around = Surroundings(solid, tolerance)
         eyes = np.array([*self.options.viewpoints, *self.cameras.tolist()]).reshape(-1, 3)
         rooms = self.volumes.rooms

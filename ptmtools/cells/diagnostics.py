@@ -94,22 +94,21 @@ def _door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list
     return notes
 
 
-def way_notes(building: Building) -> list[str]:
-    """The note on walkable floor to which no way leads, a warning if it is much."""
-    plan, lost = building.places.plan, ~building.has_way
-    area = shapely.area(plan)
+def way_notes(building: Building, boxes: Floats) -> list[str]:
+    """The note on walkable floor to which no way leads, in leaves with these (n, 2, 3) boxes."""
+    places = building.places
+    near = places.find_near(boxes - [0, building.walker.middle, 0])
+    area, lost = shapely.area(places.plan) * near, near & ~building.has_way
     if not area[lost].sum() >= LEAST_PLACE:
         return []
     largest = np.flatnonzero(lost)[area[lost].argmax()]
-    x, z = shapely.get_coordinates(shapely.point_on_surface(plan[largest]))[0].tolist()
-    a, b, c = building.places.slope[largest].tolist()
-    share = area[lost].sum() / area.sum()
-    note = (
-        f"{area[lost].sum():.1f} m² of walkable floor ({share:.0%}), such as "
-        f"{area[largest]:.1f} m² around {_triple((x, a * x + b * z + c, z))}, is drawn, but no way "
-        "leads there from a room, so visitors do not go there (--standing floors changes that)"
-    )
-    return [Warned(note) if share > MUCH else note]
+    x, z = shapely.get_coordinates(shapely.point_on_surface(places.plan[largest]))[0].tolist()
+    a, b, c = places.slope[largest].tolist()
+    return [
+        f"{area[lost].sum():.1f} m² of walkable floor ({area[lost].sum() / area.sum():.0%}), such "
+        f"as {area[largest]:.1f} m² around {_triple((x, a * x + b * z + c, z))}, is drawn, but no "
+        "way leads there from a room, so visitors do not go there (--standing floors changes that)"
+    ]
 
 
 def viewpoint_notes(solid: Floats) -> list[str]:

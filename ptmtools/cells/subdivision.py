@@ -256,7 +256,8 @@ def _viewers(
     """(L,) which leaves stand, `Cells.eye_floor`, and notes; ``rename``: the new number of each
     leaf of the tree."""
     standing, eye_floor = _standing(building, bodies, space)
-    notes = way_notes(building)
+    boxes = np.array([bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
+    notes = way_notes(building, boxes)
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]
         notes.append(NO_PLACES)
