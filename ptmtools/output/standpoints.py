@@ -197,7 +197,7 @@ def largest_leaves(cells: Cells, count: int, ranks: NDArray[np.int64] | None = N
 
 def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArray[np.int64]:
     """(L,) the rank of each leaf: 0 of rooms with a name, else its `SpaceKind` and 1; that of
-    leaves in which nobody stands is meaningless."""
+    leaves that do not stand is meaningless."""
     result = np.zeros(cells.leaf_count, dtype=np.int64)
     named = np.array([bool(cells.room_name(cell)) for cell in range(cells.cell_count)] + [False])
     leaves = np.flatnonzero(cells.leaf_standing & ~named[cells.leaf_cell])

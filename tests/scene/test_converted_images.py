@@ -1,4 +1,4 @@
-"""Images whose pixels are converted: the model is built, and each conversion is told."""
+"""Images whose pixels are converted: the model is built, and a warning names each conversion."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ def _indexed_faces(node: X3dNode) -> _Polygons:
 
 
 def _of_vertices(node: X3dNode, vertex: Ints, corners: int) -> _Polygons:
-    """Faces of so many corners each, whose values belong to the points."""
+    """Faces with a number of corners each, whose values belong to the points."""
     vertex = vertex[: len(vertex) // corners * corners]
     uv, colors = (_pick(_values(node, field), vertex, field) for field in ("texCoord", "color"))
     start = np.arange(0, len(vertex) + 1, corners)
