@@ -67,13 +67,12 @@ def floors_with_ways(
     for room in rooms:
         named[region[room.contains(middle)]] = True
     group = connect(count, _joins(places, around, walker))
-    seeds, ground = named | _regions_below(places, eyes, walker), every
-    if not named.any():
-        height = np.full(len(middle), walker.middle)
-        kind = space_kinds(around, middle[:, None], height, weight)
-        for_most = partial(_for_most, region=region, weight=weight, count=count)
-        enclosed, ground = for_most(kind <= SpaceKind.HALL), for_most(kind <= SpaceKind.OPEN)
-        seeds |= enclosed & (sum_by_group(group, size * enclosed, count)[group] >= _LEAST)
+    height = np.full(len(middle), walker.middle)
+    kind = space_kinds(around, middle[:, None], height, weight)
+    for_most = partial(_for_most, region=region, weight=weight, count=count)
+    enclosed, ground = for_most(kind <= SpaceKind.HALL), for_most(kind <= SpaceKind.OPEN)
+    enclosed &= sum_by_group(group, size * enclosed, count)[group] >= _LEAST
+    seeds = named | enclosed | _regions_below(places, eyes, walker)
     if not seeds.any():
         return every
     kept: Bools = np.isin(group, group[seeds])
