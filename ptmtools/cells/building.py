@@ -225,8 +225,8 @@ class Building:
             return np.ones(len(self.places.plan), dtype=np.bool_)
         around = Surroundings(solid, tolerance)
         eyes = np.array([*self.options.viewpoints, *self.cameras.tolist()]).reshape(-1, 3)
-        rooms = self.volumes.rooms
-        return floors_with_ways(self.places, around, self.walker, tolerance, rooms, eyes)
+        rooms, roofless = self.volumes.rooms, self.ceiling is not None
+        return floors_with_ways(self.places, around, self.walker, tolerance, rooms, eyes, roofless)
 
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""

@@ -39,7 +39,12 @@ class Walker(NamedTuple):
     def reach(self) -> float:
         """Greatest height of eyes above the floor, metres: 2.2 for a height of 1.7, since visitors
         may be taller."""
-        return self.height * (2.2 / 1.7)
+        return 2.2 * self.scale
+
+    @property
+    def scale(self) -> float:
+        """Height beside that of the default visitor: buildings in another unit have rooms in it."""
+        return self.height / 1.7
 
 
 #: The default visitor.

@@ -30,15 +30,17 @@ class SpaceKind(IntEnum):
     SOLID = 5  # the inside of a wall or of the ground
 
 
-def space_kinds(around: Surroundings, points: Floats, height: Floats, weight: Floats) -> Ints:
+def space_kinds(
+    around: Surroundings, points: Floats, height: Floats, weight: Floats, scale: float
+) -> Ints:
     """(n,) the kind of each space by (n, k, 3) points in it at the height of the eye, which is (n,)
     ``height`` metres above its floor: that of most points. ``weight``: (n,) of each space, such as
-    its area."""
+    its area. ``scale``: see `Walker.scale`."""
     count, looks = points.shape[:2]
     flat = points.reshape(-1, 3)
     walled = around.enclose(flat, roofed=False)
     up = around.first(flat, np.tile([0.0, 1.0, 0.0], (len(flat), 1)))[0]
-    clear = up + np.repeat(height, looks)
+    clear = (up + np.repeat(height, looks)) / scale
     kind = np.select(
         [clear < CLEAR[0], ~walled, clear <= CLEAR[1], np.isfinite(clear)],
         [SpaceKind.LOW, SpaceKind.OPEN, SpaceKind.ROOM, SpaceKind.HALL],

@@ -29,7 +29,8 @@ from ptmtools.cells.search import connect
 from ptmtools.cells.structure import Surroundings
 from ptmtools.tolerance import Tolerance
 
-#: Greatest distance of regions that are joined, metres; below the second, nothing is between them.
+#: Greatest distance of regions that are joined, metres for the default visitor (`Walker.scale`);
+#: below the second, nothing is between them.
 _STRIDE, _TOUCH = 0.5, 0.02
 #: Points of a region that tell whether it is a room, and lines tried between two regions.
 _LOOKS, _LINES = 9, 8
@@ -46,6 +47,7 @@ def floors_with_ways(
     tolerance: Tolerance,
     rooms: tuple[Volume, ...],
     eyes: Floats,
+    roofless: bool,
 ) -> Bools:
     """(r,) which of the regions of ``places`` visitors reach from a room; all if none is a room.
 
@@ -54,6 +56,7 @@ def floors_with_ways(
     around: what is solid.
     rooms: the spaces that the model names.
     eyes: (n, 3) cameras and viewpoints, metres.
+    roofless: whether rooms end at the top of their walls, so that courts stay beside rooms.
     """
     count = len(places.plan)
     every = np.ones(count, dtype=np.bool_)
@@ -68,13 +71,15 @@ def floors_with_ways(
         named[region[room.contains(middle)]] = True
     group = connect(count, _joins(places, around, walker))
     height = np.full(len(middle), walker.middle)
-    kind = space_kinds(around, middle[:, None], height, weight)
+    kind = space_kinds(around, middle[:, None], height, weight, walker.scale)
     for_most = partial(_for_most, region=region, weight=weight, count=count)
     enclosed, ground = for_most(kind <= SpaceKind.HALL), for_most(kind <= SpaceKind.OPEN)
-    enclosed &= sum_by_group(group, size * enclosed, count)[group] >= _LEAST
+    enclosed &= sum_by_group(group, size * enclosed, count)[group] >= _LEAST * walker.scale**2
     seeds = named | enclosed | _regions_below(places, eyes, walker)
     if not seeds.any():
         return every
+    if roofless:
+        seeds |= for_most(kind == SpaceKind.COURT)
     kept: Bools = np.isin(group, group[seeds])
     if not named.any() and size[kept].sum() < _SHARE * size.sum():
         kept = np.isin(group, group[seeds | ground])
@@ -109,18 +114,18 @@ def _for_most(is_kind: Bools, region: Ints, weight: Floats, count: int) -> Bools
 
 def _joins(places: Places, around: Surroundings, walker: Walker) -> Ints:
     """(p, 2) pairs of regions that are joined, as many as connect all that are."""
-    plan, slope = places.plan, places.slope
-    first, second = shapely.STRtree(plan).query(plan, "dwithin", distance=_STRIDE)
+    plan, slope, stride = places.plan, places.slope, _STRIDE * walker.scale
+    first, second = shapely.STRtree(plan).query(plan, "dwithin", distance=stride)
     least, greatest = heights(plan, slope)
     near = first < second
-    near &= least[first] <= greatest[second] + walker.step + _STRIDE  # of slopes up to 45°
-    near &= least[second] <= greatest[first] + walker.step + _STRIDE
+    near &= least[first] <= greatest[second] + walker.step + stride  # of slopes up to 45°
+    near &= least[second] <= greatest[first] + walker.step + stride
     first, second = first[near], second[near]
     level = np.abs(least[first] - least[second]) <= walker.step
     steep = np.any(slope[first, :2] != slope[second, :2], axis=1)
-    level[steep] = _meet(plan, slope, first[steep], second[steep], walker.step)
+    level[steep] = _meet(plan, slope, first[steep], second[steep], walker)
     first, second = first[level], second[level]
-    touching = shapely.dwithin(plan[first], plan[second], _TOUCH)
+    touching = shapely.dwithin(plan[first], plan[second], _TOUCH * walker.scale)
     joins = np.stack([first, second], axis=1)
     group = connect(len(plan), joins[touching])
     # Across a gap, such as an open doorway without a floor: a few lines at the height of the body.
@@ -137,19 +142,19 @@ def _joins(places: Places, around: Surroundings, walker: Walker) -> Ints:
     return np.concatenate([joins[touching], apart[row[free]]])
 
 
-def _meet(plan: Geometry, slope: Floats, first: Ints, second: Ints, step: float) -> Bools:
+def _meet(plan: Geometry, slope: Floats, first: Ints, second: Ints, walker: Walker) -> Bools:
     """(n,) whether regions of different slopes are somewhere no farther apart than a stride, and in
-    height than a ``step``, metres: at corners of one or the other, or between two of these."""
+    height than a step: at corners of one or the other, or between two of these."""
     low, high = np.full(len(first), np.inf), np.full(len(first), -np.inf)
     shapely.prepare(plan)
     for start, to in ((first, second), (second, first)):
         point, pair = shapely.get_coordinates(plan[start], return_index=True)
-        near = shapely.dwithin(plan[to[pair]], shapely.points(point), _STRIDE)
+        near = shapely.dwithin(plan[to[pair]], shapely.points(point), _STRIDE * walker.scale)
         point, pair = point[near], pair[near]
         rise = _height(point, slope[second[pair]]) - _height(point, slope[first[pair]])
         np.minimum.at(low, pair, rise)
         np.maximum.at(high, pair, rise)
-    return np.asarray((low <= step) & (high >= -step))
+    return np.asarray((low <= walker.step) & (high >= -walker.step))
 
 
 def _height(point: Floats, slope: Floats) -> Floats:
@@ -167,10 +172,10 @@ def _free(
     end = shapely.get_coordinates(line)[1::2]
     floor, next_floor = _height(point, places.slope[start]), _height(end, places.slope[to])
     length = np.linalg.norm(end - point, axis=1)
-    result: Bools = (length <= _STRIDE) & (np.abs(next_floor - floor) <= walker.step)
+    result: Bools = (length <= _STRIDE * walker.scale) & (np.abs(next_floor - floor) <= walker.step)
     some = np.flatnonzero(result)
     along = np.zeros((len(some), 3))
-    along[:, PLAN] = (end - point)[some] / np.maximum(length[some], _TOUCH)[:, None]
+    along[:, PLAN] = (end - point)[some] / np.maximum(length[some], _TOUCH * walker.scale)[:, None]
     floor = np.maximum(floor, next_floor)[some] + walker.step
     for share in (0.05, 0.5, 0.95):
         eye = np.insert(point[some], 1, floor + share * (walker.height - walker.step), 1)

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.options import WALKER
 from ptmtools.cells.room_kinds import space_kinds
 from ptmtools.cells.structure import Surroundings
-from ptmtools.output.model import Vector
+from ptmtools.output.model import EYE, Vector
 from ptmtools.output.storeys import area, leaf_section
 from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
@@ -214,7 +215,8 @@ def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArr
     points[:, :, 1] = np.where(fits, floor + eye, points[:, 0, 1])[:, None]
     around = Surroundings(scene.corners, scene.tolerance)
     volume = cells.leaf_volumes()[leaves]
-    result[leaves] = 1 + space_kinds(around, points, height, volume)
+    scale = eye / (WALKER.height * EYE)
+    result[leaves] = 1 + space_kinds(around, points, height, volume, scale)
     return result
 
 
