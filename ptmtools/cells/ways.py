@@ -114,44 +114,82 @@ def _for_most(is_kind: Bools, region: Ints, weight: Floats, count: int) -> Bools
 
 def _joins(places: Places, around: Surroundings, walker: Walker) -> Ints:
     """(p, 2) pairs of regions that are joined, as many as connect all that are."""
-    plan, slope, stride = places.plan, places.slope, _STRIDE * walker.scale
-    first, second = shapely.STRtree(plan).query(plan, "dwithin", distance=stride)
-    least, greatest = heights(plan, slope)
-    near = first < second
-    near &= least[first] <= greatest[second] + walker.step + stride  # of slopes up to 45°
-    near &= least[second] <= greatest[first] + walker.step + stride
-    first, second = first[near], second[near]
-    level = np.abs(least[first] - least[second]) <= walker.step
-    steep = np.any(slope[first, :2] != slope[second, :2], axis=1)
-    level[steep] = _meet(plan, slope, first[steep], second[steep], walker)
-    first, second = first[level], second[level]
-    touching = shapely.dwithin(plan[first], plan[second], _TOUCH * walker.scale)
-    joins = np.stack([first, second], axis=1)
-    group = connect(len(plan), joins[touching])
+    plan, slope = places.plan, places.slope
+    joins = _with_a_corner(places, walker)
+    pairs = _near_pairs(places, walker, _TOUCH, connect(len(plan), joins))
+    steep = np.flatnonzero(np.any(slope[pairs[:, 0], :2] != slope[pairs[:, 1], :2], axis=1))
+    meet = _meet(places, pairs[steep], walker)
+    joins = np.concatenate([joins, np.delete(pairs, steep[~meet], axis=0)])
     # Across a gap, such as an open doorway without a floor: a few lines at the height of the body.
-    apart = joins[group[first] != group[second]]
-    size = shapely.get_num_coordinates(plan)
-    large = size[apart].argmax(axis=1)[:, None]
-    to, start = np.take_along_axis(apart, np.hstack([large, 1 - large]), axis=1).T
-    point, row = shapely.get_coordinates(plan[start], return_index=True)
+    group = connect(len(plan), joins)
+    pairs = _near_pairs(places, walker, _STRIDE, group)
+    for count in (1, _LINES):
+        pairs = pairs[group[pairs[:, 0]] != group[pairs[:, 1]]]
+        points, row = _ends_of_lines(plan, pairs, count)
+        free = _free(places, around, walker, points, *pairs[row].T)
+        joins = np.concatenate([joins, pairs[row[free]]])
+        group = connect(len(plan), joins)
+    return joins
+
+
+def _ends_of_lines(plan: Geometry, pairs: Ints, count: int) -> tuple[Floats, Ints]:
+    """(m, 2) points of the first of each of (p, 2) ``pairs`` of regions, and (m,) its row: the one
+    nearest to the second if ``count`` is 1, else about so many of its corners."""
+    start, to = plan[pairs].T
+    if count == 1:
+        return shapely.get_coordinates(shapely.shortest_line(start, to))[::2], np.arange(len(pairs))
+    point, row = shapely.get_coordinates(start, return_index=True)
     turn = np.arange(len(row)) - np.searchsorted(row, row)
-    some = turn % np.maximum(size[start] // _LINES, 1)[row] == 0
-    nearest = shapely.get_coordinates(shapely.shortest_line(plan[start], plan[to]))[::2]
-    point, row = np.concatenate([nearest, point[some]]), np.append(np.arange(len(to)), row[some])
-    free = _free(places, around, walker, point, start[row], to[row])
-    return np.concatenate([joins[touching], apart[row[free]]])
+    some = turn % np.maximum(shapely.get_num_coordinates(start) // count, 1)[row] == 0
+    return point[some], row[some]
 
 
-def _meet(plan: Geometry, slope: Floats, first: Ints, second: Ints, walker: Walker) -> Bools:
-    """(n,) whether regions of different slopes are somewhere no farther apart than a stride, and in
-    height than a step: at corners of one or the other, or between two of these."""
-    low, high = np.full(len(first), np.inf), np.full(len(first), -np.inf)
+def _with_a_corner(places: Places, walker: Walker) -> Ints:
+    """(p, 2) pairs of regions with corners in one place, not a step apart: most of a scan."""
+    point, region = shapely.get_coordinates(places.plan, return_index=True)
+    height = _height(point, places.slope[region])
+    side = _TOUCH * walker.scale / 2
+    square = np.unique(np.floor(point / side), axis=0, return_inverse=True)[1].reshape(-1)
+    order = np.lexsort((height, square))
+    first, second = order[:-1], order[1:]
+    level = (square[first] == square[second]) & (height[second] - height[first] <= walker.step)
+    return np.asarray(region[np.stack([first, second], axis=1)[level]])
+
+
+def _near_pairs(places: Places, walker: Walker, distance: float, group: Ints) -> Ints:
+    """(p, 2) pairs of regions of different groups, (r,) ``group``, that are no farther apart than a
+    distance, metres for the default visitor, and, if level, than a step in height; those of fewer
+    corners first."""
+    plan, slope, distance = places.plan, places.slope, distance * walker.scale
+    least, greatest = heights(plan, slope)
+    box = shapely.bounds(plan) + np.array([-distance, -distance, distance, distance]) / 2
+    box = shapely.box(*box.T)
+    first, second = shapely.STRtree(box).query(box)
+    rise = walker.step + _STRIDE * walker.scale  # of slopes up to 45°
+    near = (first < second) & (group[first] != group[second])
+    near &= least[first] <= greatest[second] + rise
+    near &= least[second] <= greatest[first] + rise
+    first, second = first[near], second[near]
+    near = np.any(slope[first, :2] != slope[second, :2], axis=1)
+    near |= np.abs(least[first] - least[second]) <= walker.step
+    near[near] = shapely.dwithin(plan[first[near]], plan[second[near]], distance)
+    pairs = np.stack([first[near], second[near]], axis=1)
+    size = shapely.get_num_coordinates(plan)[pairs]
+    return np.take_along_axis(pairs, size.argsort(axis=1, kind="stable"), axis=1)
+
+
+def _meet(places: Places, pairs: Ints, walker: Walker) -> Bools:
+    """(p,) whether (p, 2) pairs of regions of different slopes are somewhere no farther apart than
+    a stride, and in height than a step: at corners of one or the other, or between two of these."""
+    plan, slope = places.plan, places.slope
+    low, high = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
     shapely.prepare(plan)
-    for start, to in ((first, second), (second, first)):
+    for start, to in (pairs.T, pairs[:, ::-1].T):
         point, pair = shapely.get_coordinates(plan[start], return_index=True)
         near = shapely.dwithin(plan[to[pair]], shapely.points(point), _STRIDE * walker.scale)
         point, pair = point[near], pair[near]
-        rise = _height(point, slope[second[pair]]) - _height(point, slope[first[pair]])
+        first, second = pairs[pair].T
+        rise = _height(point, slope[second]) - _height(point, slope[first])
         np.minimum.at(low, pair, rise)
         np.maximum.at(high, pair, rise)
     return np.asarray((low <= walker.step) & (high >= -walker.step))
