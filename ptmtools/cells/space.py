@@ -36,7 +36,7 @@ from ptmtools.cells.portals import (
     update_portals,
 )
 from ptmtools.cells.search import connect
-from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
+from ptmtools.cells.structure import LOOKS, Surroundings, sample_rows, spread_over
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance, rank
@@ -51,6 +51,9 @@ _CHOICE = 256
 _GARDEN = 4.0
 #: A model of solids has less walled floor around them than this many times that inside of them.
 _PLATE = 0.5
+#: Points of floor from which lines of sight tell whether a building is open, and the share of those
+#: in one region that must not be mistaken: rays pass through cracks.
+_SIGHTS, _SEES_OUT = 4096, 0.05
 #: A void is hardly the building if less than this share of the model's surfaces bounds it.
 _HARDLY = 0.1
 
@@ -220,7 +223,7 @@ class DividedSpace:
     tree: Tree
     portals: list[Portal]
     reached: Bools  # (L,) which leaves are reachable
-    closed: bool  # whether these do not touch the root box; meaningless for a clipped one
+    closed: bool  # whether these do not touch the root box; false for a clipped one
     doors: Bools  # (d,) which door leaves are open
     # Unreachable rooms; their leaves are in ``reached`` under `--reach all`.
     beyond: Unreached = field(default_factory=lambda: Unreached([]))
@@ -232,9 +235,33 @@ class DividedSpace:
     undecided: Counter[str] = field(default_factory=Counter)
 
 
-def divide_inside(building: Building, box: Floats) -> DividedSpace:
+def is_open_to_sight(building: Building) -> bool:
+    """Whether lines of sight alone show what a division of the first root box would: visitors walk
+    on open ground between walls, much more than any void can hold; see `_is_elsewhere`.
+
+    Where no door leaf is in the way, a region of floor is open from end to end if some of it is.
+    """
+    structure = building.structure
+    corners, region = building.places.only(building.places.front).triangles_by_region(
+        structure.tolerance
+    )
+    points, row = sample_rows(corners, _SIGHTS)
+    if not len(points):
+        return False
+    points += [0.0, building.walker.middle, 0.0]
+    around = Surroundings(structure.corners, structure.tolerance)
+    sees_out = around.see_out(points)
+    if not structure.door.any():
+        count = np.bincount(region[row])
+        share = sum_by_group(region[row], sees_out, len(count)) / np.maximum(count, 1)
+        sees_out |= share[region[row]] >= _SEES_OUT
+    walled = np.count_nonzero(sees_out & around.enclose(points, roofed=False))
+    return bool(walled > _GARDEN * np.count_nonzero(~sees_out))
+
+
+def divide_inside(building: Building, box: Floats, progress: Progress = silent) -> DividedSpace:
     """Subdivide the box between two corners, (2, 3); leaves at its sides count as inside."""
-    return divide(building, Polyhedron.box(*box), inside=True)
+    return replace(divide(building, Polyhedron.box(*box), progress, inside=True), closed=False)
 
 
 def divide(

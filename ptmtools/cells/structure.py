@@ -240,10 +240,15 @@ def points_in(corners: Floats, number: Ints) -> Floats:
 
 def sample(corners: Floats, count: int) -> Floats:
     """(count, 3) points spread by area over (n, 3, 3) triangles; none without an area."""
+    return sample_rows(corners, count)[0]
+
+
+def sample_rows(corners: Floats, count: int) -> tuple[Floats, Ints]:
+    """The points of `sample`, and (count,) the triangle of each."""
     total = np.cumsum(areas(corners))
     number = np.arange(count if len(total) and total[-1] > 0 else 0)
     row = np.searchsorted(total, (number + 0.5) / count * total[-1:])
-    return points_in(corners[row], number)
+    return points_in(corners[row], number), row
 
 
 def spread_over(points: Floats, count: int) -> Floats:
@@ -298,6 +303,13 @@ class Surroundings:
         """(n,) whether a surface is straight above each of (n, 3) points."""
         result: Bools = self._hits(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))[0] >= 0
         return result
+
+    def see_out(self, points: Floats) -> Bools:
+        """(n,) whether a level ray or one upwards from each of (n, 3) points meets nothing, not
+        even the edge of a surface."""
+        along = np.append(self._level, [[0.0, 1.0, 0.0]], axis=0)
+        hit = self._hits(np.repeat(points, len(along), axis=0), np.tile(along, (len(points), 1)))
+        return np.asarray((hit < 0).all(axis=0).reshape(len(points), -1).any(axis=1))
 
     def free_about(self, points: Floats) -> Floats:
         """(n, r) metres that r level rays from each of (n, 3) points go, infinite without a hit."""

@@ -3,7 +3,8 @@
 1. Walls propose planes (`structure`), which split the root box into convex leaves (`bsp`); the
    parts of the leaves' boundaries that no wall covers are portals (`portals`).
 2. A flood through the portals finds the reachable leaves (`space`). If it meets the first root
-   box, which is wider than the model, the model is open, and its bounding box is divided instead.
+   box, which is wider than the model, the model is open, and its bounding box is divided instead,
+   as it is at once if sight shows that.
 3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
 4. Leaves that no standing viewer sees are left out (`sight`), the others grouped (`rooms`).
 5. Pieces of geometry with the same owners are joined again (`joining`).
@@ -42,7 +43,7 @@ from ptmtools.cells.planes import Polyhedron, bounds, boxes_meet
 from ptmtools.cells.portals import ends_of
 from ptmtools.cells.rooms import group_cells
 from ptmtools.cells.sight import seen_from_places
-from ptmtools.cells.space import DividedSpace, divide, divide_inside
+from ptmtools.cells.space import DividedSpace, divide, divide_inside, is_open_to_sight
 from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
@@ -91,20 +92,25 @@ def _divide_building(
     """The divided space of a building, the first root box if that is closed, else the second; and
     notes on it. ``large``: whether the division takes long."""
     wide, tight, notes = building.wide, building.tight, [*building_notes(building)]
-    clipped = executor.submit(divide_inside, building, tight, long=large)
-    try:
-        space = divide(building, wide, progress)
-        if not space.closed:
-            outside, space = space, replace(clipped.result(), closed=False)
-            notes.append(_open_note(outside, building.doors.floor.roof_share, tight, space.ceiling))
-    finally:
-        clipped.cancel()
+    if is_open_to_sight(building):
+        space, no_room = divide_inside(building, tight, progress), False
+    else:
+        clipped = executor.submit(divide_inside, building, tight, long=large)
+        try:
+            space = divide(building, wide, progress)
+            no_room = not space.reached.any()
+            if not space.closed:
+                space = clipped.result()
+        finally:
+            clipped.cancel()
+    if not space.closed:
+        notes.append(_open_note(no_room, building.doors.floor.roof_share, tight, space.ceiling))
     limit, many = building.options.max_leaves, _portal_count(space) > MOST_PORTALS
     while _portal_count(space) > MOST_PORTALS:
         limit = len(space.tree.leaves) // 2
         fewer = replace(building, options=replace(building.options, max_leaves=limit))
         again = divide(fewer, wide) if space.closed else space
-        space = again if again.closed else replace(divide_inside(fewer, tight), closed=False)
+        space = again if again.closed else divide_inside(fewer, tight)
     notes += space_notes(building, space)
     if space.tree.unsplit:
         notes.append(_limit_note(space.tree.unsplit, limit, many))
@@ -170,11 +176,11 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _open_note(space: DividedSpace, roofed: float, box: Floats, ceiling: float | None) -> str:
+def _open_note(no_room: bool, roofed: float, box: Floats, ceiling: float | None) -> str:
     roofless = roofed < ROOFED or ceiling is not None
     if roofless:
         state = f"open at the top: {1 - roofed:.0%} of the floor has no ceiling"
-    elif not space.reached.any():
+    elif no_room:
         state = "open: no room is closed off from the outside"
     else:
         state = "open: the outside can be reached from the rooms (windows, doors or gaps)"

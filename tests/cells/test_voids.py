@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.cells import subdivide
+from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells.building import Building
+from ptmtools.cells.space import divide, is_open_to_sight
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.orientation.space import to_world
 from tests.cells.buildings import AXES, carved, room, write
-from tests.cells.strangers import Parts
+from tests.cells.strangers import Parts, galleries, office, serpentine, street
 from tests.scene.buildings import box
 
 
@@ -58,3 +60,23 @@ def test_where_the_building_is(
     assert cells.closed == closed
     assert leaf >= 0
     assert cells.leaf_standing[leaf]
+
+
+@pytest.mark.parametrize(
+    ("parts", "shows"),
+    [
+        (walls_on_a_base(0.6), True),
+        (court(), True),
+        (serpentine(2), True),
+        (house_in_a_garden(), False),  # the garden has no more floor than four houses
+        (office(4), False),
+        (galleries(1, 3), False),
+        (street(2), False),  # few walls are around its ground
+    ],
+    ids=["plate", "court", "halls", "garden", "office", "galleries", "street"],
+)
+def test_sight_shows_what_a_division_would(parts: Parts, shows: bool, tmp_path: Path) -> None:
+    scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
+    building = Building.from_scene(scene, SubdivideOptions())
+    assert is_open_to_sight(building) == shows
+    assert not (shows and divide(building, building.wide).closed)
