@@ -28,7 +28,7 @@ class LightOptions:
     light_density: float = option(
         10.0, "Texels of a lightmap for each metre of surface.", metavar="TEXELS"
     )
-    light_samples: int = option(64, "Number of rays for each texel of a lightmap.")
+    light_samples: int = option(32, "Number of rays for each texel of a lightmap.")
 
     true_colours: Literal["works", "none"] = option(
         "works",

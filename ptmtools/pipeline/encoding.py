@@ -153,7 +153,7 @@ def bake_textures(
 
 
 #: Times that an image of codes is encoded, at most, and the mean error that needs no other.
-_TRIES, _UNSEEN = 3, 0.1
+_TRIES, _UNSEEN = 3, 0.25
 
 
 def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tuple[str, bytes]:
