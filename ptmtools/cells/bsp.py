@@ -15,7 +15,7 @@ of a thin wall (`_seals`), for which it waits until no other wall splits.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -25,12 +25,11 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, ranges
-from ptmtools.cells import split_planes as caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, buffer, difference, intersection, open_part
 from ptmtools.cells.planes import Polyhedron, clip_polygon, cut, section
-from ptmtools.cells.split_planes import DoorPlanes, Reveals
+from ptmtools.cells.split_planes import DoorPlanes, Reveals, find_caps
 from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.progress import Progress
 from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
@@ -82,8 +81,8 @@ class _Fragment(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """A node that waits for its split, and the source of its fragments: walls, reveals, doors or
-    caps. Priorities are distinct."""
+    """A node that waits for its split, the source of its fragments, walls, reveals, doors or caps,
+    and known caps. Priorities are distinct."""
 
     priority: tuple[bool, int, int, int]
     body: Polyhedron
@@ -91,6 +90,7 @@ class _Task(NamedTuple):
     best: int
     parent: tuple[int, int]
     source: int
+    caps: Sequence[WallPlane] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +190,9 @@ class _Growth:
         if task.source == _DOORS:
             self._hung.add(node)
         self._place(task.parent, node)
+        capping = task.caps
+        if task.source == _CAPS:  # which close the section of a part, too
+            capping = [f.wall for i, f in enumerate(task.fragments) if i != task.best]
         extents = _Extents(task.fragments)
         ahead = [extents.ahead(facing, tolerance) for facing in (plane, -plane)]
         cut_by = ahead[0] & ahead[1]
@@ -198,7 +201,7 @@ class _Growth:
                 raise AssertionError("a split that was accepted has two sides")
             # A part of a node that a door or a cap split may have further reveals and doors.
             if task.source > _REVEALS:
-                self._push(body, [], (node, side), _REVEALS)
+                self._push(body, [], (node, side), _REVEALS, capping)
                 continue
             facing = plane if side == 0 else -plane
             rows = [i for i in np.flatnonzero(ahead[side]).tolist() if i != task.best]
@@ -207,36 +210,45 @@ class _Growth:
                 for f in (task.fragments[i] for i in rows)
             ]
             whole = [not cut_by[i] for i in rows]
-            self._push(body, _fragments(inherited, whole, tolerance), (node, side), task.source)
+            inside = _fragments(inherited, whole, tolerance)
+            self._push(body, inside, (node, side), task.source, capping)
 
     def _push(
-        self, body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
+        self,
+        body: Polyhedron,
+        fragments: list[_Fragment],
+        parent: tuple[int, int],
+        source: int,
+        capping: Sequence[WallPlane] = (),
     ) -> None:
         """Lets a body wait with its best split, of the first source that has one; a leaf if none
-        has."""
+        has. ``capping``: caps of a body around it."""
         walls, tolerance = self._walls, self._tolerance
         best = _best_split(body, fragments, self._least[source], walls, tolerance)
         if best < 0 and source == _WALLS:
             best = _best_split(body, fragments, self._least[source], walls, tolerance, sheets=True)
         while best < 0 and source < _CAPS:
             source += 1
-            fragments = self._of_source(source, body)
+            fragments = self._of_source(source, body, capping)
             best = _best_split(body, fragments, self._least[source], walls, tolerance)
         if best < 0:
             self._finish(body, parent)
             return
         share = fragments[best].area / tolerance.extent**2
         priority = (source > _REVEALS, -round(share / TIE_SHARE), len(walls), parent[1])
-        heapq.heappush(self.queue, _Task(priority, body, fragments, best, parent, source))
+        task = _Task(priority, body, fragments, best, parent, source, capping)
+        heapq.heappush(self.queue, task)
 
-    def _of_source(self, source: int, body: Polyhedron) -> list[_Fragment]:
+    def _of_source(
+        self, source: int, body: Polyhedron, capping: Sequence[WallPlane]
+    ) -> list[_Fragment]:
         """The fragments inside a body of the planes of a source other than walls."""
         planes, tolerance = self._planes, self._tolerance
         if source == _REVEALS:
             return _sections(body, planes.reveals.select(body, self._walls), tolerance)
         if source == _DOORS:
             return _sections(body, planes.doors.select(body), tolerance)
-        return _sections(body, caps.find_caps(planes.structure, body), tolerance, whole=True)
+        return _sections(body, find_caps(planes.structure, body, capping), tolerance, whole=True)
 
     def _finish(self, body: Polyhedron, parent: tuple[int, int]) -> None:
         self._place(parent, -2 - len(self.leaves))

@@ -71,8 +71,10 @@ def clear_of(
     """
     pieces, owner, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
     by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
+    flat = corners[:, :, PLAN]
+    boxes = shapely.box(*flat.min(axis=1).T, *flat.max(axis=1).T)
     while len(region):
-        row, near = _pairs_near(corners, by_height, plan, slope, band, radius)
+        row, near = _pairs_near(corners, boxes, by_height, plan, slope, band, radius)
         crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
             longest(plan) > _SHORT * band[1]
         )
@@ -88,6 +90,7 @@ def clear_of(
 
 def _pairs_near(
     corners: Floats,
+    boxes: Geometry,
     by_height: ByHeight,
     plan: Geometry,
     slope: Floats,
@@ -95,14 +98,13 @@ def _pairs_near(
     radius: float,
 ) -> tuple[Ints, Ints]:
     """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
-    ``band``, whose boxes in plan are no more than a radius apart."""
+    ``band``, whose boxes in plan, those of the latter in ``boxes``, are no more than a radius
+    apart."""
     least, greatest = heights(plan, slope)
     margin = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
     least, greatest = least - margin, greatest + margin
     storey = np.floor(least / (_STOREY * (band[1] - band[0])))
     rows, hits = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    flat = corners[:, :, PLAN]
-    boxes = shapely.box(*flat.min(axis=1).T, *flat.max(axis=1).T)
     x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
     reach = shapely.box(x0 - radius, z0 - radius, x1 + radius, z1 + radius)
     # Storey by storey, so that a floor is compared only with triangles of its height.

@@ -164,10 +164,11 @@ def _openings(
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:
         return
-    every = union(shared, tolerance.grid, more=True)
+    every = shared[0] if len(shared) == 1 else union(shared, tolerance.grid, more=True)
     if wall.barring is None and shapely.covered_by(every, wall.blocking):
         return
-    opening = open_part(every, wall.blocking, tolerance)
+    free = shapely.disjoint(wall.blocking, every)  # which is prepared
+    opening = every if free else open_part(every, wall.blocking, tolerance)
     openings = [(opening, False)]
     if wall.barring is not None:
         way = open_part(every, wall.barring, tolerance)
@@ -175,7 +176,11 @@ def _openings(
     for shape, passage in openings:
         if shapely.is_empty(shape):
             continue
-        pieces = intersection(shared, shape, tolerance.grid, more=True)
+        pieces = shared
+        if len(shared) > 1:
+            pieces = intersection(shared, shape, tolerance.grid, more=True)
+        elif shape is not every:
+            pieces = [shape]
         for a, b, piece in zip(i.tolist(), j.tolist(), pieces, strict=True):
             for part in shapely.get_parts(piece):
                 if not _wider_than(part, tolerance.plane):

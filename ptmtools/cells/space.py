@@ -246,7 +246,7 @@ def is_open_to_sight(building: Building) -> bool:
         structure.tolerance
     )
     points, row = sample_rows(corners, _SIGHTS)
-    if not len(points):
+    if not (len(points) and len(structure.corners)):
         return False
     points += [0.0, building.walker.middle, 0.0]
     around = Surroundings(structure.corners, structure.tolerance)

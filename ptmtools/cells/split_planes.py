@@ -16,6 +16,7 @@ removed (`portals`).
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -190,10 +191,12 @@ _SPARE = 1e-3
 _CHUNK = 4096
 
 
-def find_caps(structure: Structure, body: Polyhedron) -> list[WallPlane]:
+def find_caps(
+    structure: Structure, body: Polyhedron, known: Sequence[WallPlane] = ()
+) -> list[WallPlane]:
     """The planes whose polygons leave no opening between two parts of a body, in the order of the
     model's triangles: many are equally good, and areas of strips some centimetres wide keep few
-    digits far from the origin."""
+    digits far from the origin. ``known``: those of a body around it."""
     low, high = bounds(body.points)
     near = structure.nearby.meeting(low, high)
     slack, corners = structure.tolerance.plane, structure.corners[near]
@@ -206,6 +209,11 @@ def find_caps(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     free = needed <= nearby
     home = structure.bins.own[inside]
     caps: list[tuple[int, WallPlane]] = []
+    for wall in known:
+        members = np.flatnonzero(structure.lie_in(wall.frame.plane, inside))
+        if free[members].any():
+            free[members] = False
+            caps.append((int(inside[members[0]]), wall))
     tries = Tries(np.unique(home, return_inverse=True)[1].reshape(-1), areas)
     for seed in rank(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
         if not (free[seed] and tries.worth[seed]):
@@ -239,9 +247,39 @@ def _cap(body: Polyhedron, plane: Floats, structure: Structure, near: Ints) -> W
     if len(outline) < 3:
         return None
     frame = PlaneFrame.from_plane(plane)
-    blocking = structure.unite(frame, near[structure.lie_in(plane, near)])
+    lies = near[structure.lie_in(plane, near)]
+    flat = frame.to_plane(structure.corners[lies])
+    if _see_through(frame.to_plane(outline), flat, tolerance.hairline):
+        return None
+    blocking = structure.unite(frame, lies)
     opening = open_part(shapely.polygons(frame.to_plane(outline)), blocking, tolerance)
     return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
+
+
+#: Points of a section that are tried for an opening: on the way from its middle to its corners.
+_TRIED = np.array([0.3, 0.6, 0.9])
+
+
+def _see_through(outline: Floats, triangles: Floats, width: float) -> bool:
+    """Whether a disc of this ``width`` in a convex polygon, (k, 2), between (n, 3, 2) triangles of
+    its plane is met by trying few: a test in no time that most sections with an opening pass."""
+    middle = outline.mean(axis=0)
+    points = np.concatenate([[middle], *(middle + t * (outline - middle) for t in _TRIED)])
+    inside = -_beyond(points, outline[None])[:, 0] >= width
+    return bool((_beyond(points[inside], triangles) >= width).all(axis=1).any())
+
+
+def _beyond(points: Floats, polygons: Floats) -> Floats:
+    """(p, n) how far (p, 2) points are beyond the edges of convex polygons, (n, k, 2), in any
+    sense: no more than the distance outside, and no less than minus the one inside."""
+    along = np.roll(polygons, -1, axis=1) - polygons
+    across = np.stack([along[..., 1], -along[..., 0]], axis=-1)
+    length = np.linalg.norm(across, axis=-1, keepdims=True)
+    across = np.divide(across, length, out=np.zeros_like(across), where=length > 0)
+    turn = np.sign(np.einsum("nkc,nkc->n", across, polygons - polygons.mean(axis=1, keepdims=True)))
+    height = np.einsum("pc,nkc->pnk", points, across) - np.einsum("nkc,nkc->nk", across, polygons)
+    result: Floats = (turn[:, None] * height).max(axis=2, initial=-np.inf)
+    return result
 
 
 def _section_areas(body: Polyhedron, planes: Floats) -> Floats:
