@@ -23,6 +23,7 @@ from ptmtools.cells.bsp import Tree
 from ptmtools.cells.doors import Doors
 from ptmtools.cells.fabric import Fabric
 from ptmtools.cells.floors import Floors, ceiling_height
+from ptmtools.cells.hangings import without_hangings
 from ptmtools.cells.model import descend
 from ptmtools.cells.named_rooms import Contact, Volumes, contacts
 from ptmtools.cells.options import SubdivideOptions, Walker
@@ -155,8 +156,10 @@ class Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
         fabric = Fabric.from_scene(scene, options)
         doors, structure = Doors.recognise(fabric, Structure.from_fabric(fabric, tolerance))
-        every = find_walls(structure, options.wall_area)
-        walls = every if options.structural else without_facets(every)
+        every = flat = walls = find_walls(structure, options.wall_area)
+        if not options.structural:
+            flat = without_facets(every)
+            walls = without_hangings(flat, structure, options.wall_thickness)
         walker = Walker(*options.walker)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
         floors = Floors.from_fabric(fabric, GRAIN * walker.radius)
@@ -183,7 +186,7 @@ class Building:
             cameras=np.array([camera.position for camera in scene.cameras]).reshape(-1, 3),
             furniture=tuple(scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]),
             shaped=len(shaped),
-            facets=len(every) - len(walls),
+            facets=len(every) - len(flat),
         )
 
     @property

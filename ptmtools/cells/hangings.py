@@ -1,0 +1,157 @@
+"""Surfaces that hang on a wall or stand before it, such as pictures, screens, boards and radiators:
+they are drawn and occlude, but divide nothing, since nobody fits between them and the wall.
+
+A **front** is a polygon before another, larger wall that covers it from nearby and faces it, as the
+other side of the same wall does not. Linings and the leaves of cavity walls are as near to another
+wall, but floors, ceilings and walls meet their edges; those of a front are free for the most part:
+beside them the wall behind it is to be seen from before it. Polygons between a front and its wall
+are backs, which hang, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.cells.planar import Geometry, buffer, intersection
+from ptmtools.cells.planes import PlaneFrame
+from ptmtools.cells.structure import Structure, Surroundings, WallPlane
+from ptmtools.tolerance import Tolerance
+
+#: Greatest distance of a hanging from its wall, as a share of the greatest thickness of walls.
+_OFF = 0.5
+#: A hanging has at most this share of the wall's area, of which this share of its own is before it.
+_SMALLER, _COVERED = 0.9, 0.9
+#: Planes are parallel to this cosine; a wall leans by less than this sine.
+_PARALLEL, _LEANS = 0.9998, 0.02
+#: Points along the edge, so far from it, as a share of the greatest distance; at least this share
+#: of them see the wall behind, and as far as that many of the greatest distances to the other side.
+_POINTS, _BESIDE, _FREE, _ROOM = 32, 0.2, 0.55, 1.0
+
+
+@dataclass(frozen=True)
+class _Surfaces:
+    """The upright polygons of walls."""
+
+    wall: Ints  # (p,) the number of the plane
+    frame: list[PlaneFrame]  # of each
+    shape: Geometry  # (p,) in it
+    area: Floats  # (p,) m²
+    plane: Floats  # (p, 4)
+
+    @staticmethod
+    def of_walls(walls: list[WallPlane]) -> _Surfaces:
+        upright = [i for i, wall in enumerate(walls) if abs(wall.frame.plane[1]) < _LEANS]
+        shapes = np.array([walls[i].walls for i in upright], dtype=object)
+        shape, row = shapely.get_parts(shapes, return_index=True)
+        number = np.array(upright, dtype=np.int64)[row]
+        frame = [walls[i].frame for i in number]
+        plane = np.array([f.plane for f in frame]).reshape(-1, 4)
+        return _Surfaces(number, frame, shape, shapely.area(shape), plane)
+
+    def candidates(self, number: int, distance: float) -> Ints:
+        """The larger ones in planes parallel to that of one, no farther than a distance."""
+        plane, turn = self.plane[number], self.plane[:, :3] @ self.plane[number, :3]
+        gap = np.abs(plane[3] - np.sign(turn) * self.plane[:, 3])
+        near = (np.abs(turn) > _PARALLEL) & (gap <= 2 * distance)
+        near &= (self.area[number] <= _SMALLER * self.area) & (self.wall != self.wall[number])
+        return np.flatnonzero(near)
+
+    def outline(self, number: int) -> Floats:
+        """(n, 3) the corners of the outer ring of one."""
+        ring = shapely.get_exterior_ring(self.shape[number])
+        return self.frame[number].to_space(shapely.get_coordinates(ring))
+
+    def way(self, number: int, other: int) -> tuple[Floats, float]:
+        """(3,) the unit vector from one to the plane of another, and the greatest distance, metres;
+        0 if it is on both sides of that plane."""
+        plane = self.plane[other]
+        height = self.outline(number) @ plane[:3] + plane[3]
+        gap = 0.0 if np.ptp(np.sign(height)) else float(np.abs(height).max())
+        return -np.sign(height[0]) * plane[:3], gap
+
+    def covers(self, number: int, other: int, tolerance: Tolerance) -> bool:
+        """Whether one is before or behind most of another."""
+        flat = shapely.polygons(self.frame[number].to_plane(self.outline(other)))
+        common = intersection(flat, self.shape[number], tolerance.grid)
+        return bool(shapely.area(common) >= _COVERED * shapely.area(flat))
+
+    def facing(self, structure: Structure, number: int) -> Floats:
+        """(3,) the normal of most triangles in one; 0 if they face both ways."""
+        flat = structure.corners[structure.find_in(self.plane[number])]
+        middle = self.frame[number].to_plane(flat.mean(axis=1))
+        facing = normals(flat[shapely.intersects_xy(self.shape[number], *middle.T)])
+        total: Floats = facing.sum(axis=0)
+        one_way = 2 * np.linalg.norm(total) > np.linalg.norm(facing, axis=1).sum()
+        return total if one_way else np.zeros(3)
+
+    def beside(self, number: int, distance: float) -> Floats:
+        """(n, 3) points spread along the edge of one, at a distance outside."""
+        hull = shapely.convex_hull(self.shape[number])
+        ring = shapely.get_exterior_ring(buffer(hull, distance, quad_segs=1))
+        shares = (np.arange(_POINTS) + 0.5) / _POINTS
+        points = shapely.line_interpolate_point(ring, shares, normalized=True)
+        return self.frame[number].to_space(shapely.get_coordinates(points))
+
+
+def without_hangings(
+    walls: list[WallPlane], structure: Structure, wall_thickness: float
+) -> list[WallPlane]:
+    """The walls without the polygons that hang on others; see the module's head."""
+    surfaces, distance = _Surfaces.of_walls(walls), _OFF * wall_thickness
+    around: Surroundings | None = None
+    backs: list[tuple[int, int]] = []
+    fronts: dict[int, list[int]] = {}  # of hangings, by the wall that they are before
+    for number in range(len(surfaces.wall)):
+        for other in surfaces.candidates(number, distance).tolist():
+            toward, gap = surfaces.way(number, other)
+            if not 0 < gap <= distance or not surfaces.covers(other, number, structure.tolerance):
+                continue
+            if surfaces.facing(structure, other) @ toward >= 0:
+                continue
+            if surfaces.facing(structure, number) @ toward > 0:
+                backs.append((number, other))
+                continue
+            around = around or Surroundings(structure.corners, structure.tolerance)
+            beside = surfaces.beside(number, _BESIDE * distance)
+            if _is_free(around, beside, toward, gap, distance):
+                fronts.setdefault(other, []).append(number)
+    hanging = np.zeros(len(surfaces.wall), dtype=np.bool_)
+    hanging[[number for numbers in fronts.values() for number in numbers]] = True
+    for number, other in backs:
+        gap = surfaces.way(number, other)[1]
+        hanging[number] |= any(
+            surfaces.way(front, other)[1] > gap
+            and surfaces.covers(front, number, structure.tolerance)
+            for front in fronts.get(other, ())
+        )
+    return _without(walls, surfaces, hanging)
+
+
+def _is_free(
+    around: Surroundings, points: Floats, toward: Floats, gap: float, distance: float
+) -> bool:
+    """Whether most of (n, 3) points see the front of a wall behind, ``toward`` it at a ``gap``, and
+    nothing near on the other side."""
+    along = np.tile(toward, (len(points), 1))
+    (back, facing), front = around.first(points, along), around.first(points, -along)[0]
+    free: Bools = (back >= 0.5 * gap) & (back <= gap + 0.1 * distance) & (front >= _ROOM * distance)
+    free &= facing @ toward < 0
+    return bool(free.mean() >= _FREE)
+
+
+def _without(walls: list[WallPlane], surfaces: _Surfaces, hanging: Bools) -> list[WallPlane]:
+    """The walls without some polygons; those that hold no other are left out."""
+    result = []
+    touched = set(surfaces.wall[hanging].tolist())
+    for number, wall in enumerate(walls):
+        if number not in touched:
+            result.append(wall)
+            continue
+        kept = surfaces.shape[(surfaces.wall == number) & ~hanging]
+        if len(kept):
+            result.append(replace(wall, walls=shapely.multipolygons(kept)))
+    return result
