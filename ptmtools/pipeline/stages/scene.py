@@ -217,7 +217,7 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 17
+    recipe = 18
     changed = "images and files of more kinds are read"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")

@@ -111,6 +111,19 @@ def is_drawn(product: Any) -> bool:
     return product.is_a(_GROUND) or not any(map(product.is_a, _NOT_DRAWN.split()))
 
 
+def is_provision(product: Any) -> bool:
+    """Whether a product reserves the place of an opening, by its type: in IFC2X3 by a name."""
+    from ifcopenshell.util import element
+
+    if not product.is_a("IfcBuildingElementProxy"):
+        return False
+    with suppress(*FAULTS):
+        types = [product, element.get_type(product)]
+        names = (getattr(t, name, None) for t in types for name in ("PredefinedType", "ObjectType"))
+        return any(str(name).upper() == "PROVISIONFORVOID" for name in names)
+    return False
+
+
 def kind_of(product: Any) -> Kind:
     """The role of a product by its class, or that of the product that it is a part of."""
     whole = product

@@ -35,6 +35,7 @@ from ptmtools.scene.ifc.entities import (
     UNSTYLED,
     has_body,
     is_drawn,
+    is_provision,
     items,
     kind_of,
     length_unit,
@@ -191,6 +192,8 @@ def _drawn_products(file: Any, notes: IngestNotes) -> list[Any]:
             continue
         if not is_drawn(product):
             hidden[product.is_a()] += 1
+        elif is_provision(product):
+            hidden["IfcBuildingElementProxy, a provision for void"] += 1
         elif not has_body(product):
             notes.note("PTM-N215", f"{product.is_a()}: lines without a surface")
         else:

@@ -205,6 +205,27 @@ def test_what_is_not_drawn(tmp_path: Path, kind: str) -> None:
     assert ("PTM-N215", f"{kind}: not drawn", 2) in notes(findings)
 
 
+@pytest.mark.parametrize(
+    ("schema", "attribute", "value"),
+    [
+        ("IFC4", "PredefinedType", "PROVISIONFORVOID"),
+        ("IFC4", "ObjectType", "ProvisionForVoid"),
+        ("IFC2X3", "ObjectType", "ProvisionForVoid"),
+    ],
+)
+def test_a_provision_for_void_is_an_opening(
+    schema: str, attribute: str, value: str, tmp_path: Path
+) -> None:
+    made = Ifc(schema)
+    made.box("IfcBuildingElementProxy", "Kiosk", (0, 0, 0), (1, 1, 1))
+    provision = made.box("IfcBuildingElementProxy", "Provision", (5, 0, 0), (6, 1, 1))
+    setattr(provision, attribute, value)
+    source, findings = read(made.write(tmp_path / "file.ifc"))
+    assert source.objects == ("IfcBuildingElementProxy Kiosk",)
+    note = "IfcBuildingElementProxy, a provision for void: not drawn"
+    assert ("PTM-N215", note, 1) in notes(findings)
+
+
 class TestMaterials:
     def test_colours(self, tmp_path: Path) -> None:
         made = Ifc()
