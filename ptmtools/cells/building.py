@@ -212,7 +212,7 @@ class Building:
         structure = self.structure
         points, size = spread(self.places.triangles(structure.tolerance))
         points = spread_over(points, _SAMPLES) + [0.0, self.walker.middle, 0.0]
-        around = Surroundings(structure.corners, structure.tolerance)
+        around = structure.around
         inside = around.enclose(points)
         some = spread_over(points[inside], LOOKS)
         hollow = np.mean([not around.solid(point[None]) for point in some]) if len(some) else 0.0
@@ -223,10 +223,12 @@ class Building:
         """(r,) whether visitors stand in each region of the places: a way leads there from a
         room."""
         structure, tolerance = self.structure, self.structure.tolerance
-        solid = structure.corners[~structure.door | (self.options.doors == "closed")]
-        if self.options.standing != "places" or not len(solid):
+        solid = ~structure.door | (self.options.doors == "closed")
+        if self.options.standing != "places" or not solid.any():
             return np.ones(len(self.places.plan), dtype=np.bool_)
-        around = Surroundings(solid, tolerance)
+        around = structure.around
+        if not solid.all():
+            around = Surroundings(structure.corners[solid], tolerance)
         eyes = np.array([*self.options.viewpoints, *self.cameras.tolist()]).reshape(-1, 3)
         rooms, roofless = self.volumes.rooms, self.ceiling is not None
         return floors_with_ways(self.places, around, self.walker, tolerance, rooms, eyes, roofless)
@@ -234,6 +236,8 @@ class Building:
     def with_glass(self) -> Surroundings:
         """The surroundings in which glass counts as a wall."""
         structure = self.structure
+        if not len(self.doors.glass):
+            return structure.around
         walls = np.concatenate([structure.corners, self.doors.glass])
         return Surroundings(walls, structure.tolerance)
 

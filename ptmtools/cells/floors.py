@@ -31,7 +31,7 @@ from ptmtools.cells.planar import Geometry, unite_rows
 from ptmtools.cells.planes import PLAN, PlaneFrame, Polyhedron, bounds, section
 from ptmtools.cells.portals import FLOOR_COSINE
 from ptmtools.cells.search import distinct
-from ptmtools.cells.structure import INSIDE, Structure, Surroundings, WallPlane, sample
+from ptmtools.cells.structure import INSIDE, Structure, WallPlane, sample
 from ptmtools.tolerance import Tolerance
 
 #: Number of small regions from which a floor is a scan.
@@ -162,7 +162,7 @@ class SampledFloor:
             return SampledFloor(np.zeros(0), np.zeros(0, dtype=bool))
         among = low[tall].min(axis=0)[PLAN], high[tall].max(axis=0)[PLAN]
         eyes = sample(_parts_in(corners[level], *among), _POINTS) + [0.0, apart, 0.0]
-        around = Surroundings(corners, structure.tolerance)
+        around = structure.around
         wide = around.free_about(eyes)
         eyes = eyes[(np.isfinite(wide).mean(axis=1) >= INSIDE) & (wide.min(axis=1) >= radius)]
         return SampledFloor(eyes[:, 1] - apart, around.cover(eyes))

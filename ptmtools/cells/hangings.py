@@ -102,7 +102,6 @@ def without_hangings(
 ) -> list[WallPlane]:
     """The walls without the polygons that hang on others; see the module's head."""
     surfaces, distance = _Surfaces.of_walls(walls), _OFF * wall_thickness
-    around: Surroundings | None = None
     backs: list[tuple[int, int]] = []
     fronts: dict[int, list[int]] = {}  # of hangings, by the wall that they are before
     for number in range(len(surfaces.wall)):
@@ -115,9 +114,8 @@ def without_hangings(
             if surfaces.facing(structure, number) @ toward > 0:
                 backs.append((number, other))
                 continue
-            around = around or Surroundings(structure.corners, structure.tolerance)
             beside = surfaces.beside(number, _BESIDE * distance)
-            if _is_free(around, beside, toward, gap, distance):
+            if _is_free(structure.around, beside, toward, gap, distance):
                 fronts.setdefault(other, []).append(number)
     hanging = np.zeros(len(surfaces.wall), dtype=np.bool_)
     hanging[[number for numbers in fronts.values() for number in numbers]] = True

@@ -37,7 +37,7 @@ from ptmtools.cells.planar import (
     union,
 )
 from ptmtools.cells.planes import BOX_FACE, Polyhedron
-from ptmtools.cells.structure import Structure, Surroundings
+from ptmtools.cells.structure import Structure
 from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 
 
@@ -248,7 +248,7 @@ def largest_leaf(
     hollow: Iterable[int] = ()
     outwards = bool(order) and _outwards(corners)
     if outwards:
-        around = Surroundings(corners, structure.tolerance)
+        around = structure.around
         floored = around.have_floor(np.array(list(middle.values())))
         hollow = (leaf for leaf in compress(order, floored) if not around.solid(middle[leaf][None]))
     for leaves, solid in ((hollow, False), (order, outwards)):

@@ -36,7 +36,7 @@ from ptmtools.cells.portals import (
     update_portals,
 )
 from ptmtools.cells.search import connect
-from ptmtools.cells.structure import LOOKS, Surroundings, sample_rows, spread_over
+from ptmtools.cells.structure import LOOKS, sample_rows, spread_over
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance, rank
@@ -143,7 +143,7 @@ def find_unreached(
     if not ((waiting | outside).any() and len(structure.corners)):
         return Unreached([])
     standing = Standing.from_tree(tree, waiting, building)
-    around = Surroundings(structure.corners, structure.tolerance)
+    around = structure.around
     # Apart, since the ground may be so large that few samples on it are in a building.
     sheltered = Standing.from_tree(tree, outside & ~outer, building)
     sheltered = sheltered.append(Standing.from_tree(tree, outside & outer, building))
@@ -249,7 +249,7 @@ def is_open_to_sight(building: Building) -> bool:
     if not (len(points) and len(structure.corners)):
         return False
     points += [0.0, building.walker.middle, 0.0]
-    around = Surroundings(structure.corners, structure.tolerance)
+    around = structure.around
     sees_out = around.see_out(points)
     if not structure.door.any():
         count = np.bincount(region[row])
@@ -336,7 +336,7 @@ def _is_elsewhere(
     as much if the void is a ``solid``; or that is hardly bounded by surfaces of the model.
     ``outer``: (L,) which leaves are at the box."""
     structure = building.structure
-    around = Surroundings(structure.corners, structure.tolerance)
+    around = structure.around
     if not solid:
         largest = rank(np.array([body.volume for body in tree.leaves]) * reached)[:LOOKS]
         middle = [tree.leaves[leaf].points.mean(axis=0) for leaf in largest if reached[leaf]]

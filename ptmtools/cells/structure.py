@@ -15,6 +15,7 @@ opposite directions in the two is ignored.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -89,6 +90,14 @@ class Structure:
             source=source[first[order]],
             door=door[first[order]],
         )
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in vars(self).items() if name != "around"}
+
+    @cached_property
+    def around(self) -> Surroundings:
+        """Rays among the triangles."""
+        return Surroundings(self.corners, self.tolerance)
 
     def lie_in(self, plane: Floats, triangles: Ints) -> Bools:
         """(n,) whether these triangles, by number, lie in a plane."""

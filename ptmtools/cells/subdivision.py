@@ -44,7 +44,7 @@ from ptmtools.cells.portals import ends_of
 from ptmtools.cells.rooms import group_cells
 from ptmtools.cells.sight import seen_from_places
 from ptmtools.cells.space import DividedSpace, divide, divide_inside, is_open_to_sight
-from ptmtools.cells.structure import LOOKS, Surroundings, spread_over
+from ptmtools.cells.structure import LOOKS, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.executor import Executor
@@ -322,7 +322,7 @@ def _find_buried(building: Building, points: Floats, eye_floor: Floats) -> Float
     structure = building.structure
     if not (len(points) and len(eye_floor)):
         return points[:0]
-    around = Surroundings(structure.corners, structure.tolerance)
+    around = structure.around
     body = eye_floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
     if around.solid(spread_over(body, LOOKS)):
         return points[:0]
