@@ -159,7 +159,7 @@ class Building:
         every = flat = walls = find_walls(structure, options.wall_area)
         if not options.structural:
             flat = without_facets(every)
-            walls = without_hangings(flat, structure, options.wall_thickness)
+            walls = without_hangings(flat, structure, options.wall_area, options.wall_thickness)
         walker = Walker(*options.walker)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
         floors = Floors.from_fabric(fabric, GRAIN * walker.radius)

@@ -1,11 +1,11 @@
-"""Surfaces that hang on a wall or stand before it, such as pictures, screens, boards and radiators:
-they are drawn and occlude, but divide nothing, since nobody fits between them and the wall.
+"""Surfaces that hang on a wall or lie before it, such as pictures, screens, boards, radiators and
+rugs: they are drawn and occlude, but divide nothing, since nobody fits between them and the wall.
 
 A **front** is a polygon before another, larger wall that covers it from nearby and faces it, as the
 other side of the same wall does not. Linings and the leaves of cavity walls are as near to another
-wall, but floors, ceilings and walls meet their edges; those of a front are free for the most part:
-beside them the wall behind it is to be seen from before it. Polygons between a front and its wall
-are backs, which hang, too.
+wall, and so is a floor to the ground below, but large surfaces meet them: walls, floors, ceilings.
+Nothing large meets a front, and its edges are free for the most part: beside them the wall behind
+it is to be seen from before it. Polygons between a front and its wall are backs, which hang, too.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.cells.places import shadows
 from ptmtools.cells.planar import Geometry, buffer, intersection
 from ptmtools.cells.planes import PlaneFrame
 from ptmtools.cells.structure import Structure, Surroundings, WallPlane
@@ -25,8 +26,10 @@ from ptmtools.tolerance import Tolerance
 _OFF = 0.5
 #: A hanging has at most this share of the wall's area, of which this share of its own is before it.
 _SMALLER, _COVERED = 0.9, 0.9
-#: Planes are parallel to this cosine; a wall leans by less than this sine.
-_PARALLEL, _LEANS = 0.9998, 0.02
+#: Planes are parallel to this cosine.
+_PARALLEL = 0.9998
+#: A triangle is large from this share of the least area of walls on.
+_LARGE = 0.25
 #: Points along the edge, so far from it, as a share of the greatest distance; at least this share
 #: of them see the wall behind, and as far as that many of the greatest distances to the other side.
 _POINTS, _BESIDE, _FREE, _ROOM = 32, 0.2, 0.55, 1.0
@@ -34,7 +37,7 @@ _POINTS, _BESIDE, _FREE, _ROOM = 32, 0.2, 0.55, 1.0
 
 @dataclass(frozen=True)
 class _Surfaces:
-    """The upright polygons of walls."""
+    """The polygons of walls."""
 
     wall: Ints  # (p,) the number of the plane
     frame: list[PlaneFrame]  # of each
@@ -44,10 +47,8 @@ class _Surfaces:
 
     @staticmethod
     def of_walls(walls: list[WallPlane]) -> _Surfaces:
-        upright = [i for i, wall in enumerate(walls) if abs(wall.frame.plane[1]) < _LEANS]
-        shapes = np.array([walls[i].walls for i in upright], dtype=object)
-        shape, row = shapely.get_parts(shapes, return_index=True)
-        number = np.array(upright, dtype=np.int64)[row]
+        shapes = np.array([wall.walls for wall in walls], dtype=object)
+        shape, number = shapely.get_parts(shapes, return_index=True)
         frame = [walls[i].frame for i in number]
         plane = np.array([f.plane for f in frame]).reshape(-1, 4)
         return _Surfaces(number, frame, shape, shapely.area(shape), plane)
@@ -79,6 +80,20 @@ class _Surfaces:
         common = intersection(flat, self.shape[number], tolerance.grid)
         return bool(shapely.area(common) >= _COVERED * shapely.area(flat))
 
+    def meets_large(self, structure: Structure, number: int, least: float, distance: float) -> bool:
+        """Whether a triangle of at least this area, m², that reaches farther than a distance from
+        the plane of one meets it there."""
+        slack, plane = structure.tolerance.plane, self.plane[number]
+        near = structure.nearby.find_between(plane, -slack, slack)
+        corners = structure.corners[near[structure.areas[near] >= least]]
+        height = corners @ plane[:3] + plane[3]
+        far = np.abs(height).max(axis=1) > distance
+        corners, height = corners[far], height[far]
+        rows, points = shadows(
+            self.frame[number].to_plane(corners), height, (-slack, slack), np.arange(len(corners))
+        )
+        return bool(len(rows)) and bool(shapely.dwithin(self.shape[number], points, slack).any())
+
     def facing(self, structure: Structure, number: int) -> Floats:
         """(3,) the normal of most triangles in one; 0 if they face both ways."""
         flat = structure.corners[structure.find_in(self.plane[number])]
@@ -98,7 +113,7 @@ class _Surfaces:
 
 
 def without_hangings(
-    walls: list[WallPlane], structure: Structure, wall_thickness: float
+    walls: list[WallPlane], structure: Structure, wall_area: float, wall_thickness: float
 ) -> list[WallPlane]:
     """The walls without the polygons that hang on others; see the module's head."""
     surfaces, distance = _Surfaces.of_walls(walls), _OFF * wall_thickness
@@ -115,7 +130,9 @@ def without_hangings(
                 backs.append((number, other))
                 continue
             beside = surfaces.beside(number, _BESIDE * distance)
-            if _is_free(structure.around, beside, toward, gap, distance):
+            if not surfaces.meets_large(
+                structure, number, _LARGE * wall_area, distance
+            ) and _is_free(structure.around, beside, toward, gap, distance):
                 fronts.setdefault(other, []).append(number)
     hanging = np.zeros(len(surfaces.wall), dtype=np.bool_)
     hanging[[number for numbers in fronts.values() for number in numbers]] = True
