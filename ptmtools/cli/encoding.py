@@ -34,8 +34,9 @@ class FilePreviews(PreviewOptions):
     exact: Exact = option(
         "always",
         "Levels in the .ptm: always all of them; lossless-sources only the coarsest of a JPEG, "
-        "lossy WebP or AVIF, whose own bytes become the finest preview; never more than the "
-        "coarsest, and the finest preview is the finest level.",
+        "lossy WebP or AVIF, whose own bytes become the finest preview, and of an image that is "
+        "smaller than its levels, which becomes lossless WebP; never more than the coarsest, and "
+        "the finest preview is the finest level.",
     )
 
     @property
@@ -109,11 +110,12 @@ def encoded_file(coding: FileCoding, job: FileJob, threads: int = 1) -> Report:
 def _put_previews(target: Path, encoded: EncodedSteps, force: bool) -> Iterator[dict[str, object]]:
     """Writes the previews beside a `.ptm`; the properties of each."""
     from ptmtools.files import write_bytes
-    from ptmtools.texture.previews import FORMATS
+    from ptmtools.texture.previews import FORMATS, LOSSLESS
 
     for preview, data in zip(encoded.steps.previews, encoded.previews, strict=True):
-        side = max(preview.width, preview.height)
-        file = target.with_name(f"{target.stem}-{side}{FORMATS[preview.format].suffix}")
+        side, suffix = max(preview.width, preview.height), FORMATS[preview.format].suffix
+        mark = "-exact" if preview.format == LOSSLESS else ""
+        file = target.with_name(f"{target.stem}-{side}{mark}{suffix}")
         write_bytes(file, data, force=force)
         yield {"file": os.fspath(file), **asdict(preview)}
 

@@ -24,7 +24,7 @@ from ptmtools.errors import WorkerError, naming
 from ptmtools.options import option, require
 from ptmtools.store.layout import IMAGES, SERVED, STAGES_FOLDER, STAGING, sha256
 from ptmtools.texture.model import EncodeOptions
-from ptmtools.texture.previews import FORMATS, Preview, PreviewOptions
+from ptmtools.texture.previews import FORMATS, LOSSLESS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
     import numpy as np
@@ -123,9 +123,12 @@ class TextureOptions(PreviewOptions, EncodeOptions):
 def encode_texels(
     options: TextureOptions, stem: str, texels: NDArray[Any]
 ) -> list[tuple[str, bytes]]:
-    """The files of (h, w, c) texels that are no image of the model, as `encode_image`."""
+    """The files of (h, w, c) texels that are no image of the model, as `encode_image`; no file of
+    theirs would be smaller than their levels."""
     from ptmtools.texture.images import png_bytes
 
+    if options.exact == "lossless-sources":
+        options = replace(options, exact="always")
     return encode_image(options, f"{stem}.png", png_bytes(texels))
 
 
@@ -196,7 +199,7 @@ def encode_image(
 
     Raises as `encode_steps` and `load_image`.
     """
-    from ptmtools.texture import load_image
+    from ptmtools.texture import load_image, read_header
     from ptmtools.texture.images.files import check_depth
     from ptmtools.texture.model import Description, Limits
     from ptmtools.texture.steps import encode_steps
@@ -217,22 +220,26 @@ def encode_image(
         (f"{SERVED}/{preview_file(stem, preview)}", preview_bytes)
         for preview, preview_bytes in zip(encoded.steps.previews, encoded.previews, strict=True)
     ]
-    if options.fallback and fallback_preview(encoded.steps, options.fallback_size) is None:
-        png = _png(options, data, picture, encoded.ptm)
+    header = read_header(encoded.ptm)
+    level, shared = fallback_image(encoded.steps, header, options.fallback_size)
+    if options.fallback and shared is None:
+        png = _png(options, data, picture, encoded.ptm, level)
         files.append((f"{SERVED}/{FOLDER}/{stem}.png", png))
     return files
 
 
-def _png(options: TextureOptions, source: bytes, picture: Picture, data: bytes) -> bytes:
-    """The fallback image."""
+def _png(
+    options: TextureOptions, source: bytes, picture: Picture, data: bytes, level: int
+) -> bytes:
+    """The fallback image, of a level that may be finer than those of the `.ptm` in ``data``."""
     from ptmtools.texture import decode, read_header
     from ptmtools.texture.images import png_bytes
     from ptmtools.texture.images.bare import bare
     from ptmtools.texture.model import Limits
 
     header, texels = read_header(data), picture.array()
-    level = fallback_level(header, options.fallback_size)
-    if level < len(header.levels) - 1 or options.max_error or header.trimmed:
+    finest = len(header.levels) - 1
+    if level < finest or (level == finest and (options.max_error or header.trimmed)):
         # Decoding takes more than the image, which is within the limit.
         return png_bytes(decode(data, level=level, limits=Limits(64 * texels.nbytes + (1 << 20))))
     return bare(source, "PNG") if source.startswith(PNG_MAGIC) else png_bytes(texels)
@@ -463,14 +470,20 @@ def read_steps(data: bytes) -> Steps:
     return Steps(detail, errors, int(fields["exact_levels"]), previews)
 
 
-def fallback_preview(steps: Steps, size: int) -> Preview | None:
-    """The preview that is the fallback image: the finest one of a texture whose `.ptm` lacks that
-    level, unless it exceeds ``size`` (0: none does)."""
-    if not steps.previews:
-        return None
-    finest = steps.previews[-1]
-    fits = not size or max(finest.width, finest.height) <= size
-    return finest if steps.finest_is_image and fits else None
+def fallback_image(steps: Steps, header: PtmHeader, size: int) -> tuple[int, Preview | None]:
+    """The level of the fallback image, and the preview that serves as one; None for a PNG.
+
+    The level is the finest that does not exceed ``size`` (0: none does): one of the `.ptm`, or the
+    finest of all where that is an image. A WebP or AVIF serves only if the model has it: other
+    images are PNG, which all VRML browsers read.
+    """
+    if steps.finest_is_image:
+        finest = steps.previews[-1]
+        if not size or max(finest.width, finest.height) <= size:
+            return finest.level, None if finest.format == LOSSLESS else finest
+    sides = [max(level.width, level.height) for level in header.levels]
+    fitting = [n for n, side in enumerate(sides) if side <= size or not size]
+    return (fitting[-1] if fitting else 0), None
 
 
 def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:
@@ -484,10 +497,3 @@ def without_finest(options: TextureOptions, count: int, width: int, height: int)
     levels, kept = len(level_sizes(width, height)), kept_levels(width, height, options)
     last = max(min(kept[-1], levels - 1 - count), kept[0])
     return replace(options, min_level=kept[0], max_level=last)
-
-
-def fallback_level(header: PtmHeader, size: int) -> int:
-    """The level that a fallback image of this size holds, see `TextureOptions`."""
-    sides = [max(level.width, level.height) for level in header.levels]
-    fitting = [n for n, side in enumerate(sides) if side <= size or not size]
-    return fitting[-1] if fitting else 0

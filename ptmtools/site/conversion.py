@@ -80,14 +80,16 @@ def web_texture(file: Path, row: Mapping[str, Any]) -> SiteTexture:
 
 
 def without_exact(file: Path, texture: SiteTexture) -> SiteTexture:
-    """A texture of a site without the exact levels that finer previews replace, if a preview has
-    the finest level; raises DatabaseError as `web_texture`."""
+    """A texture of a site without the exact levels, or the lossless image, that previews replace,
+    if a preview has the finest level; raises DatabaseError as `web_texture`."""
     from ptmtools.texture.container import cut, read_header
     from ptmtools.texture.previews import coarse_levels
 
     row, sizes = texture.row, sizes_of(texture.row)
     levels = coarse_levels([max(size) for size in sizes])
     previews = row.get("previews", ())
+    if len(previews) > 1 and previews[-2]["level"] == previews[-1]["level"]:
+        return SiteTexture({**row, "previews": previews[:-1]}, texture.data, texture.note)
     if not previews or previews[-1]["level"] < len(sizes) - 1 or levels >= len(row["ends"]):
         return texture
     data = texture.data

@@ -4,7 +4,8 @@ For the error that a visitor sees over a thin link, an exact level takes ten tim
 lossy image of it. So a texture has three kinds of steps: the coarsest levels, exact; previews,
 which browsers decode by themselves; the exact levels. A preview stands alone: it needs no other
 bytes. A texture whose source is lossy already keeps the bytes of that image as its finest step and
-has no lossless copy.
+has no lossless copy. One whose exact levels exceed its file, as those of most images with a palette
+do, has its finest level as a lossless image instead.
 
 `benchmarks/codec/previews.py` prints the bytes and errors behind these choices:
 
@@ -51,6 +52,10 @@ WORTH = 0.5
 #: Bytes of a texture beside a lossy source that is its own exact form, as a share of the source;
 #: and the part of them for the coarsest levels.
 BESIDE, COARSE_PART = 0.1, 0.4
+#: Bytes that a lossless image must save to be worth its file.
+WORTH_SAVING = 2048
+#: Effort of its encoder, 0 to 100: the next twentieth of the bytes takes twenty times as long.
+EFFORT = 75
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ class PreviewFormat:
     parameters: Mapping[str, Any]
 
 
-WEBP, AVIF, JPEG = "webp", "avif", "jpeg"
+WEBP, AVIF, JPEG, LOSSLESS = "webp", "avif", "jpeg", "lossless"
 #: Formats by name. Images with alpha are WebP where the chosen format has none.
 FORMATS: Mapping[str, PreviewFormat] = {
     WEBP: PreviewFormat(
@@ -88,7 +93,17 @@ FORMATS: Mapping[str, PreviewFormat] = {
     JPEG: PreviewFormat(
         "read by everything; twice the bytes", ".jpg", "image/jpeg", 65500, False, {}
     ),
+    LOSSLESS: PreviewFormat(
+        "WebP of an exact level",
+        ".webp",
+        "image/webp",
+        16383,
+        True,
+        {"exact": True, "lossless": True},
+    ),
 }
+#: Formats that users choose from.
+_CHOICES = {name: form for name, form in FORMATS.items() if name != LOSSLESS}
 #: Formats of lossy sources, as `Picture.lossy` names them, that browsers show.
 SOURCES = {"JPEG": JPEG, "WebP": WEBP, "AVIF": AVIF}
 Exact = Literal["always", "lossless-sources", "never"]
@@ -107,13 +122,13 @@ class PreviewOptions:
         metavar="QUALITY",
         basic=True,
     )
-    preview_format: str = option(WEBP, "Format of the previews", choices=FORMATS)
+    preview_format: str = option(WEBP, "Format of the previews", choices=_CHOICES)
     exact: Exact = option(
         "lossless-sources",
         "Textures with lossless levels: always all of them; lossless-sources those whose images "
         "are lossless, while a JPEG, lossy WebP or AVIF is sent as it is, or as a preview of as "
-        "many bytes if browsers do not read it; never none, and the finest preview is the finest "
-        "level.",
+        "many bytes if browsers do not read it, and an image that is smaller than its levels as "
+        "lossless WebP; never none, and the finest preview is the finest level.",
         basic=True,
     )
 
@@ -146,7 +161,7 @@ class Preview:
     difference: the mean over its texels of the root mean square over the colour components, as the
         image decodes, from the exact level; 0 to 255.
     error: root mean square from the finest level, 0 to 255.
-    exact: whether it is the source of the texture, and so its exact form.
+    exact: whether it is the exact form of the texture: its source, or lossless.
     """
 
     level: int
@@ -258,8 +273,8 @@ class Pyramid:
         difference = round_difference(length / texel_count)
         return Preview(level, width, height, len(data), name, difference, round_difference(error))
 
-    def source(self, data: bytes, name: str) -> Preview:
-        """The preview that is the source of the texture."""
+    def exact(self, data: bytes, name: str) -> Preview:
+        """The preview that is the exact form of the texture."""
         height, width = self.levels[-1].shape[:2]
         return Preview(len(self.levels) - 1, width, height, len(data), name, 0.0, 0.0, exact=True)
 
@@ -315,7 +330,8 @@ def image_bytes(texels: Samples, name: str, quality: int, **more: Any) -> bytes:
         shown = np.concatenate([np.repeat(texels[..., :1], 3, axis=2), texels[..., 1:]], axis=2)
     image = Image.fromarray(shown[..., 0] if shown.shape[2] == 1 else shown)
     buffer = io.BytesIO()
-    image.save(buffer, name.upper(), quality=quality, **FORMATS[name].parameters, **more)
+    form = FORMATS[name]
+    image.save(buffer, form.media[6:].upper(), quality=quality, **form.parameters, **more)
     return buffer.getvalue()
 
 

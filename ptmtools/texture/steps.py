@@ -4,6 +4,11 @@ A *source that is its own exact form*, a JPEG, lossy WebP or AVIF, keeps its byt
 only the coarsest levels, and previews of the levels between fill the rest of a tenth of its bytes.
 A lossy source that browsers do not read, or that was converted, has a preview of as many bytes
 instead: exact levels would repeat its losses in four times the bytes.
+
+A lossless source whose exact levels and previews exceed its file has its finest level as lossless
+WebP: images with a palette take 0.8 to 1.0 of their PNG so, and 1.2 to 1.7 as levels, which code
+colours and not their places in the palette. The finest level has a lossy preview besides, since a
+lossless image is of no use before its last byte.
 """
 
 from __future__ import annotations
@@ -18,13 +23,18 @@ from typing import TYPE_CHECKING
 from ptmtools.texture.previews import (
     BESIDE,
     COARSE_PART,
+    EFFORT,
+    FORMATS,
+    LOSSLESS,
     SOURCES,
     WORTH,
+    WORTH_SAVING,
     Preview,
     PreviewOptions,
     Pyramid,
     Steps,
     coarse_levels,
+    image_bytes,
 )
 
 if TYPE_CHECKING:
@@ -84,6 +94,7 @@ class _StepsEncoder:
         from ptmtools.texture.samples import in_eight_bits
 
         self._picture, self._options, self._previews = picture, options, previews
+        self._source = source
         self._texels, self._threads = picture.array(), threads
         height, width = self._texels.shape[:2]
         sizes, kept = level_sizes(width, height), kept_levels(width, height, options)
@@ -92,21 +103,22 @@ class _StepsEncoder:
         #: Numbers in the complete pyramid of the kept levels, and of those that are always exact.
         self._kept = kept
         self._coarse = kept[: coarse_levels([max(sizes[n]) for n in kept])]
-        is_whole = kept[-1] == len(sizes) - 1 and len(self._coarse) < len(kept)
-        #: The finest level of a lossy source, which then has no exact levels but the coarse ones.
-        self._finest = self._lossy_level(source) if is_whole else None
+        self._is_whole = kept[-1] == len(sizes) - 1 and len(self._coarse) < len(kept)
+        #: The finest level as an image, beside which only the coarse levels are exact.
+        self._finest = self._lossy_level() if self._is_whole else None
 
     def encode_all(self) -> EncodedSteps:
         """See `encode_steps`."""
         from ptmtools.texture.container import read_header
 
         never = self._previews.exact == "never" and len(self._coarse) < len(self._kept)
+        if not self._finest and not never:
+            data, detail = self._ptm(self._kept[-1])
+            self._finest = self._lossless_level(len(data))
         if self._finest or never:
             size = self._finest[0].bytes if self._finest else 0
             data, _ = self._ptm(self._coarse[-1], BESIDE * COARSE_PART * size)
             detail = self._pyramid.detail
-        else:
-            data, detail = self._ptm(self._kept[-1])
         levels = len(read_header(data).levels)
         steps = self._steps(data, levels)
         previews = tuple(preview for preview, _ in steps)
@@ -116,7 +128,23 @@ class _StepsEncoder:
             tuple(file for _, file in steps),
         )
 
-    def _lossy_level(self, source: bytes) -> tuple[Preview, bytes] | None:
+    def _lossless_level(self, size: int) -> tuple[Preview, bytes] | None:
+        """The finest level as a lossless image, if its exact levels, of ``size`` bytes, and their
+        previews exceed the source; None also where that image saves nothing."""
+        texels, source = self._texels, len(self._source)
+        if (
+            not (self._is_whole and source and self._previews.exact == "lossless-sources")
+            or (1 + BESIDE) * size < source + WORTH_SAVING
+            or texels.dtype.itemsize > 1
+            or max(texels.shape) > FORMATS[LOSSLESS].side
+        ):
+            return None
+        data = image_bytes(texels, LOSSLESS, EFFORT)
+        if len(data) > size - WORTH_SAVING:
+            return None
+        return self._pyramid.exact(data, LOSSLESS), data
+
+    def _lossy_level(self) -> tuple[Preview, bytes] | None:
         """The finest level as the file of a lossy source or as a preview of as many bytes; None for
         one that shall have exact levels, or the finest preview of all sources."""
         from ptmtools.texture.images.bare import bare
@@ -125,8 +153,8 @@ class _StepsEncoder:
         if lossy is None or options.exact == "always":
             return None
         if format := SOURCES.get(lossy.format):
-            data = bare(source, lossy.format)
-            return self._pyramid.source(data, format), data
+            data = bare(self._source, lossy.format)
+            return self._pyramid.exact(data, format), data
         if options.exact == "never" or not options.preview:
             return None
         return self._pyramid.fit_preview(level, lossy.bytes, options.preview_format)
@@ -163,9 +191,13 @@ class _StepsEncoder:
         count, pyramid, options = len(self._kept), self._pyramid, self._previews
         beyond = dict.fromkeys(range(levels, count), sys.maxsize)
         if self._finest:
-            del beyond[count - 1]
-            room = BESIDE * self._finest[0].bytes - len(data)
-            ladder = pyramid.ladder(options, beyond, room) if options.preview else []
+            size = self._finest[0].bytes
+            beside = BESIDE * size
+            if self._finest[0].format == LOSSLESS:
+                beside = max(beside, len(self._source) - size)
+            else:
+                del beyond[count - 1]
+            ladder = pyramid.ladder(options, beyond, beside - len(data)) if options.preview else []
             return [*ladder, self._finest]
         if not options.preview:
             return []

@@ -299,7 +299,8 @@ return stated;
 
 
 def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
-    """A preview is shown first and gives way; a damaged one is left out; one alone stays."""
+    """A preview is shown first and gives way to what is exact; a damaged one is left out; one alone
+    stays."""
     texels = textured(211, 99, 4)
     levels, preview = levels_of(texels), Preview(6, options={"quality": 80, "exact": True})
     image = saved(levels[6], preview)
@@ -310,6 +311,8 @@ def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
     (tmp_path / "some.ptm").write_bytes(encode(levels[4], EncodeOptions()))
     (tmp_path / "good.webp").write_bytes(image)
     (tmp_path / "bad.webp").write_bytes(image[:100])
+    lossless = Preview(6, options={"lossless": True, "exact": True})
+    (tmp_path / "lossless.webp").write_bytes(saved(levels[6], lossless))
     sizes = [{"width": level.shape[1], "height": level.shape[0]} for level in levels]
     textures = []
     for ptm, name in [("whole", "good"), ("whole", "bad"), ("some", "good"), ("some", "bad")]:
@@ -318,6 +321,8 @@ def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
         row = {"file": f"{name}.webp", "level": 6, "bytes": 1}
         more = {"ends": ends, "sizes": sizes, "components": 4}
         textures.append({"file": f"{ptm}.ptm", "level": 6, "previews": [row], **more})
+    twice = [row | {"file": "good.webp"}, row | {"file": "lossless.webp", "exact": True}]
+    textures.append(textures[2] | {"previews": twice})
     actual, visit = three.run(PREVIEWS, {"files": tmp_path}, textures=textures)
 
     def digests(of: Any) -> list[str]:
@@ -330,6 +335,7 @@ def test_previews_before_exact_levels(three: Any, tmp_path: Path) -> None:
         [exact, exact],
         [by_image, by_image],
         [exact[:5], exact[:5]],
+        [by_image, exact],
     ]
     assert all(states[2] == exact[:4] for states in actual)
     assert all(stated == counted for *_, stated, counted in actual)

@@ -47,6 +47,7 @@ def previewed(database: Path) -> Path:
         (lambda rows: rows[0].update(width=32), "its level is not"),
         (lambda rows: rows[0].update(exact=True), "is exact and differs"),
         (lambda rows: rows.append(rows[0]), "not in ascending order"),
+        (lambda rows: rows.insert(0, rows[0] | {"exact": True}), "not in ascending order"),
         (lambda rows: rows[0].update(level=9), "not of one pyramid"),
         (lambda rows: rows[0].update(file="previews/none.webp"), "D671"),
     ],

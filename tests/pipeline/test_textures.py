@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
@@ -17,10 +18,10 @@ from ptmtools.light.options import LightOptions
 from ptmtools.parallel import Workers
 from ptmtools.pipeline.artifacts import Run
 from ptmtools.pipeline.build import build_scene, run_stage
-from ptmtools.pipeline.encoding import TextureOptions
+from ptmtools.pipeline.encoding import TextureOptions, encode_image, fallback_image, read_steps
 from ptmtools.pipeline.stages import CELLS, TEXTURES
 from ptmtools.store.writer import DatabaseWriter
-from ptmtools.texture import read_image
+from ptmtools.texture import read_header, read_image
 from ptmtools.texture.images.bare import bare
 
 DARK = LightOptions("none")
@@ -112,3 +113,26 @@ def test_what_levels_show_outlasts_a_resumed_and_an_updated_build(tmp_path: Path
     next((db / "stages/textures").iterdir()).unlink()
     assert tasks(db) == (len(wanted), len(wanted) - 1, 0)
     assert json.loads((db / "www/hints.json").read_text())["textures"] == wanted
+
+
+@pytest.mark.parametrize(("most", "level", "side"), [(0, 8, 256), (64, 5, 32)])
+def test_the_fallback_of_a_lossless_image_is_a_png(most: int, level: int, side: int) -> None:
+    """VRML browsers do not read WebP."""
+    texels = np.random.default_rng(3).integers(0, 40, (256, 256, 1), np.uint8) * [6, 5, 4]
+    image = Image.fromarray(texels.astype(np.uint8))
+    out = io.BytesIO()
+    image.quantize(64).save(out, "PNG", optimize=True)
+    options = TextureOptions(fallback_size=most)
+    files = dict(encode_image(options, "noise.png", out.getvalue()))
+    lossless = files["www/textures/noise.webp"]
+    assert np.array_equal(read_image(lossless), texels)
+    steps = read_steps(files["stages/textures/noise.json"])
+    header = read_header(files["www/textures/noise.ptm"])
+    assert fallback_image(steps, header, most) == (level, None)
+    fallback = read_image(files["www/textures/noise.png"])
+    assert fallback.shape == (side, side, 3)
+    assert most or np.array_equal(fallback, texels)
+    plain = encode_image(replace(options, fallback=False), "noise.png", out.getvalue())
+    assert {name: data for name, data in files.items() if not name.endswith("noise.png")} == {
+        **dict(plain)
+    }

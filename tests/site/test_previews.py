@@ -154,6 +154,21 @@ def test_texels_are_those_of_pillow(visit: Callable[..., Any], kinds: Site) -> N
     assert visitor.messages == []
 
 
+def test_a_lossless_image_replaces_the_preview_of_its_level(
+    visit: Callable[..., Any], room: Site
+) -> None:
+    texels = corners_of(64, 64, 4)
+    lossless = Preview(6, options={"lossless": True, "exact": True}, exact=True)
+    texture = Texture(texels, [Preview(6), lossless], 3)
+    site = with_previews(room, {0: texture})
+    files = [preview["file"] for preview in site.index["textures"][0]["previews"]]
+    with visit(site) as visitor:
+        visitor.until(f"{whole(site)} && s.exact")
+        assert visitor.page.evaluate(LEVELS, 0) == digests(texture, levels_of(texels))
+        assert files[1] in " ".join(exchange.path for exchange in visitor.visits)
+    assert visitor.messages == []
+
+
 def test_corners_are_in_their_corners(visit: Callable[..., Any], room: Site) -> None:
     """The pictures by previews and by exact levels are alike, seen from the door."""
     exact = {n: Texture(t.texels, []) for n, t in enumerate(KINDS.values())}

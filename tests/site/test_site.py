@@ -24,7 +24,7 @@ from ptmtools.output.emission import compress
 from ptmtools.site import pictures as drawing
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of, title_of
-from ptmtools.site.conversion import lean_glb, web_texture
+from ptmtools.site.conversion import SiteTexture, lean_glb, web_texture, without_exact
 from ptmtools.site.entry import is_marked, link_bytes
 from ptmtools.site.files import DATA
 from ptmtools.site.program import ELEMENT, LATER, PROGRAM, attached_scripts
@@ -146,6 +146,18 @@ def test_without_exact_levels(two_rooms: Path, site: Site) -> None:
         cut += len(levels) < len(before)
     assert cut
     schemas.read(never.entries[told(never)["index"]].read(), schemas.SITE)
+
+
+def test_without_a_lossless_image(tmp_path: Path) -> None:
+    """Where a lossy preview has the finest level, too."""
+    images = (6, False), (7, False), (7, True)
+    rows = [{"level": n, "width": 1 << n, "height": 1 << n, "exact": e} for n, e in images]
+    row = {"width": 2, "height": 2, "ends": [9, 20], "previews": rows}
+    texture = without_exact(tmp_path / "none.ptm", SiteTexture(row))
+    assert (texture.row["previews"], texture.data) == (rows[:2], None)
+    for previews in (rows[:2], [rows[0], rows[2]]):
+        kept = SiteTexture(row | {"width": 1, "height": 1, "previews": previews, "ends": [9]})
+        assert without_exact(tmp_path / "none.ptm", kept) is kept
 
 
 def test_without_previews(two_rooms: Path) -> None:

@@ -64,7 +64,7 @@ def steps_of(source: bytes, levels: EncodeOptions | None = None, **options: obje
 @pytest.mark.parametrize("components", [1, 2, 3, 4])
 def test_every_preview_is_of_its_level(width: int, height: int, components: int) -> None:
     texels = photograph(width, height, components)
-    encoded = steps_of(saved(texels, "PNG"))
+    encoded = steps_of(saved(texels, "PNG"), exact="always")
     exact = [*decode_levels(encoded.ptm)]
     assert np.array_equal(exact[-1], texels)
     assert encoded.steps.previews
@@ -135,6 +135,51 @@ def test_a_lossy_source_is_its_own_exact_form(
     assert len(levels) == encoded.steps.exact_levels < len(encoded.steps.errors) == 10
     for level, expected in zip(levels, build_pyramid(texels), strict=False):
         assert np.array_equal(level, expected)
+
+
+def paletted(colours: int, components: int = 3) -> tuple[bytes, Texels]:
+    """A PNG of 256 x 256 texels with a palette in random order, and its texels."""
+    palette = np.random.default_rng(2).integers(0, 256, (colours, components), np.uint8)
+    places = photograph(256, 256, 1)[..., 0] % colours
+    buffer = io.BytesIO()
+    image = Image.frombytes("P", (256, 256), places.tobytes())
+    image.putpalette(palette.tobytes(), "RGBA" if components == 4 else "RGB")
+    image.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue(), palette[places]
+
+
+@pytest.mark.parametrize("components", [3, 4])
+@pytest.mark.parametrize("colours", [16, 200])
+def test_an_image_that_is_smaller_than_its_levels_is_a_lossless_image(
+    colours: int, components: int
+) -> None:
+    source, texels = paletted(colours, components)
+    levels = steps_of(source, exact="always")
+    assert len(levels.ptm) > len(source)
+    encoded = steps_of(source)
+    *between, finest = encoded.steps.previews
+    assert (finest.exact, finest.format, finest.level) == (True, "lossless", 8)
+    assert (finest.width, finest.height, finest.difference, finest.error) == (256, 256, 0, 0)
+    assert np.array_equal(decode_preview(encoded.previews[-1], components), texels)
+    beside = len(encoded.ptm) + sum(preview.bytes for preview in between)
+    assert finest.bytes + beside <= max(len(source), (1 + BESIDE) * finest.bytes)
+    assert encoded.steps.finest_is_image
+    assert encoded.steps.errors == levels.steps.errors
+    for level, expected in zip(decode_levels(encoded.ptm), build_pyramid(texels), strict=False):
+        assert np.array_equal(level, expected)
+    assert [*decode_levels(steps_of(source, exact="never").ptm)][-1].shape[0] < FIRST_SIDE
+    assert not any(preview.exact for preview in steps_of(source, exact="never").steps.previews)
+
+
+def test_images_that_are_not_smaller_than_their_levels_keep_these() -> None:
+    smooth = np.add.outer(np.arange(256), np.arange(256))[..., None] // 2 * np.ones(3)
+    for texels in (smooth.astype(np.uint8), photograph(64, 48)):
+        encoded = steps_of(saved(texels, "BMP"))
+        assert np.array_equal([*decode_levels(encoded.ptm)][-1], texels)
+        assert not encoded.steps.finest_is_image
+    deep = Picture(photograph(128, 128).astype(np.uint16) * 257)
+    encoded = encode_steps(deep, bytes(1000), EncodeOptions(), PreviewOptions())
+    assert not encoded.steps.finest_is_image
 
 
 @pytest.mark.parametrize("options", [{"exact": "always"}, {"exact": "always", "preview": 0}])

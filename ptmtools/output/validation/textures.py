@@ -107,7 +107,8 @@ def _check_previews(
     at: Place,
 ) -> None:
     rows = record.get("previews", ())
-    if any(a["level"] >= b["level"] for a, b in pairwise(rows)):
+    order = [(row["level"], row.get("exact", False)) for row in rows]
+    if any(a >= b for a, b in pairwise(order)):
         at.add("PTM-D704", "previews are not in ascending order of their levels")
         return
     if sizes_of(record)[len(record["ends"]) - 1] != (record["width"], record["height"]):

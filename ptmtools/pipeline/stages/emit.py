@@ -11,8 +11,7 @@ from ptmtools.output.options import EmitOptions
 from ptmtools.pipeline.artifacts import Artifacts, Run
 from ptmtools.pipeline.encoding import (
     OBJECTS_AHEAD,
-    fallback_level,
-    fallback_preview,
+    fallback_image,
     preview_file,
     stem_of,
 )
@@ -99,11 +98,12 @@ def read_records(
         name, owner = file
         texture = stored_texture(run, name, source, read)
         header, steps, stem = texture.header, texture.steps, stem_of(name)
-        png, fallback, level = f"{name.removesuffix('ptm')}png", None, None
+        png, fallback = f"{name.removesuffix('ptm')}png", None
+        level, shared = fallback_image(steps, header, options.fallback_size)
         if f"{SERVED}/{png}" in outputs:
-            fallback, level = png, fallback_level(header, options.fallback_size)
-        elif options.fallback and (preview := fallback_preview(steps, options.fallback_size)):
-            fallback, level = preview_file(stem, preview), preview.level
+            fallback = png
+        elif options.fallback and shared:
+            fallback = preview_file(stem, shared)
         served = f"{SERVED}/{fallback}"
         return TextureRecord(
             file=name,
@@ -113,7 +113,7 @@ def read_records(
             components=header.components,
             levels=header.levels,
             sha256=db.output(stage.name, f"{SERVED}/{name}"),
-            fallback_level=level,
+            fallback_level=level if fallback else None,
             fallback_bytes=db.size(served, db.output(stage.name, served)) if fallback else 0,
             detail=steps.detail,
             stored=source(f"{SERVED}/{name}"),

@@ -44,6 +44,7 @@ from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE, image_digests, image_rows, images_of
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import IMAGES, SERVED, sha256
+from ptmtools.texture.previews import LOSSLESS
 
 if TYPE_CHECKING:
     from threading import Event
@@ -362,7 +363,9 @@ def counts_of(textures: Iterable[StoredTexture]) -> dict[str, int]:
         counts["raw_bytes"] += width * height * texture.header.texel_bytes
         counts["ptm_bytes"] += texture.header.file_size
         counts["preview_bytes"] += sum(preview.bytes for preview in texture.steps.previews)
-        counts["kept_sources"] += any(preview.exact for preview in texture.steps.previews)
+        counts["kept_sources"] += any(
+            preview.exact and preview.format != LOSSLESS for preview in texture.steps.previews
+        )
     return counts
 
 
@@ -388,10 +391,10 @@ class TexturesStage(Stage[None]):
 
     name = "textures"
     about = "Encode the model's images as progressive textures."
-    recipe = 7
+    recipe = 8
     changed = (
-        "lossy images that were converted or that browsers do not read have a preview of as many "
-        "bytes"
+        "images that are smaller than their levels, such as those with a palette, have their "
+        "finest level as lossless WebP"
     )
     options = TextureOptions
     opens_inputs = True

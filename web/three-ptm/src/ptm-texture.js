@@ -230,6 +230,11 @@ export class PtmTexture extends DataTexture {
       if (await this.#preview(preview, Math.min(level, preview.level), signal)) break;
     }
     if (!this.#exactly && this.level >= level) return;
+    const whole = previews.at(-1);
+    // The finest level may be an image twice, of which the later one is exact.
+    if (whole?.exact && whole.level === level && whole.level > this.#sure) {
+      await this.#preview(whole, level, signal);
+    }
     const last = previews.length ? Math.min(level, ends.length - 1) : level;
     // Levels that only previews have are not replaced by fewer.
     if (last > this.#sure && last >= this.level) await this.#riseExactly(last, signal);
