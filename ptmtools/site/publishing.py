@@ -59,8 +59,8 @@ COARSE = 64
 Digests = dict[str, tuple[str, ...]]
 #: Format of the list of our files.
 FORMAT, SCHEMA = "ptmtools site files", 1
-#: Data that the walk does not show.
-_NOT_OF_WALK = (f"{DATA}/work-", f"{DATA}/icon-")
+#: Data that the walk does not show before a panel asks for them, and copies of other data.
+_NOT_OF_WALK = tuple(f"{DATA}/{name}-" for name in ("work", "icon", "vp", "opening"))
 
 
 def publish(
@@ -209,7 +209,8 @@ class Weight:
     first_room: the page, the poster, the index, and the room of the first viewpoint.
     mean_room, worst_room: record and geometry of a room, and of the textures in it the levels up to
         `COARSE` texels. Of all cells in which one can stand; worst_cell is the heaviest.
-    whole: all that a walk can need; the VRML files do not count.
+    whole: all that a walk can need. Openings, which repeat parts of other files that the page then
+        does not fetch, do not count, nor do pictures in panels and VRML files.
     """
 
     page: int

@@ -371,7 +371,9 @@ def test_weight(site: Site) -> None:
     sizes = {name: link_bytes(entry) for name, entry in site.entries.items()}
     later = tuple(f"/{name}" for name in (*LATER, *attached_scripts()))
     needed = [name for name in sizes if not name.endswith(later)]
-    needed = [n for n in needed if n not in (ELEMENT, MANIFEST) and not n.startswith("data/icon-")]
+    beside = "data/icon-", "data/vp-", "data/opening-"
+    assert {prefix for prefix in beside for name in sizes if name.startswith(prefix)} == {*beside}
+    needed = [n for n in needed if n not in (ELEMENT, MANIFEST) and not n.startswith(beside)]
     assert weight.page == sum(sizes[name] for name in needed if not name.startswith("data/"))
     assert weight.whole == sum(sizes[name] for name in needed)
     row = site.index["cells"][site.index["viewpoints"][0]["cell"]]
