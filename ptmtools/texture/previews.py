@@ -52,7 +52,8 @@ WORTH = 0.5
 #: Bytes of a texture beside a lossy source that is its own exact form, as a share of the source;
 #: and the part of them for the coarsest levels.
 BESIDE, COARSE_PART = 0.1, 0.4
-#: Bytes that a lossless image must save to be worth its file.
+#: Bytes that a lossless image must save to be worth its file, beside a tenth of its levels, some of
+#: which would suffice for views from afar.
 WORTH_SAVING = 2048
 #: Effort of its encoder, 0 to 100: the next twentieth of the bytes takes twenty times as long.
 EFFORT = 75
@@ -279,7 +280,12 @@ class Pyramid:
         return Preview(len(self.levels) - 1, width, height, len(data), name, 0.0, 0.0, exact=True)
 
     def ladder(
-        self, options: PreviewOptions, limits: Mapping[int, int], total: float = math.inf
+        self,
+        options: PreviewOptions,
+        limits: Mapping[int, int],
+        total: float = math.inf,
+        *,
+        exact_follows: bool = False,
     ) -> list[tuple[Preview, bytes]]:
         """The previews of levels from `FIRST_SIDE` on, by ascending level.
 
@@ -287,13 +293,14 @@ class Pyramid:
         ----------
         limits: the greatest number of bytes worth while, for each level that may have a preview.
         total: bytes of all previews; finer ones are left out from the first that exceeds it.
+        exact_follows: whether an exact image of the finest level replaces its preview.
         """
         kept: list[tuple[Preview, bytes]] = []
         finest = len(self.levels) - 1
         for level, limit in sorted(limits.items()):
             if max(self.levels[level].shape[:2]) < FIRST_SIDE and level < finest:
                 continue
-            lower = 0 if level == finest else LADDER
+            lower = 0 if level == finest and not exact_follows else LADDER
             quality = max(options.preview - lower, min(options.preview, LOWEST))
             preview, file = self.preview(level, quality, options.preview_format)
             if preview.bytes > limit:

@@ -130,7 +130,7 @@ class _StepsEncoder:
 
     def _lossless_level(self, size: int) -> tuple[Preview, bytes] | None:
         """The finest level as a lossless image, if its exact levels, of ``size`` bytes, and their
-        previews exceed the source; None also where that image saves nothing."""
+        previews exceed the source; None also where that image saves little."""
         texels, source = self._texels, len(self._source)
         if (
             not (self._is_whole and source and self._previews.exact == "lossless-sources")
@@ -140,7 +140,7 @@ class _StepsEncoder:
         ):
             return None
         data = image_bytes(texels, LOSSLESS, EFFORT)
-        if len(data) > size - WORTH_SAVING:
+        if len(data) + WORTH_SAVING > (1 - BESIDE) * size:
             return None
         return self._pyramid.exact(data, LOSSLESS), data
 
@@ -191,13 +191,15 @@ class _StepsEncoder:
         count, pyramid, options = len(self._kept), self._pyramid, self._previews
         beyond = dict.fromkeys(range(levels, count), sys.maxsize)
         if self._finest:
-            size = self._finest[0].bytes
+            size, lossless = self._finest[0].bytes, self._finest[0].format == LOSSLESS
             beside = BESIDE * size
-            if self._finest[0].format == LOSSLESS:
+            if lossless:
                 beside = max(beside, len(self._source) - size)
             else:
                 del beyond[count - 1]
-            ladder = pyramid.ladder(options, beyond, beside - len(data)) if options.preview else []
+            if not options.preview:
+                return [self._finest]
+            ladder = pyramid.ladder(options, beyond, beside - len(data), exact_follows=lossless)
             return [*ladder, self._finest]
         if not options.preview:
             return []
