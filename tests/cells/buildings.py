@@ -104,8 +104,8 @@ def turned(triangles: Floats) -> Floats:
 
 
 def write(path: Path, parts: Iterable[tuple[str, Floats]]) -> Path:
-    """An OBJ file of named parts, or a GLB file of all of them, whose faces have no backs; with the
-    numbers as they are."""
+    """An OBJ file of named parts, those called glass… of glass, or a GLB file of all of them, whose
+    faces have no backs; with the numbers as they are."""
     names, triangles = zip(*parts, strict=True)
     points, faces = welded(np.concatenate(triangles))
     if path.suffix == ".glb":
@@ -116,8 +116,14 @@ def write(path: Path, parts: Iterable[tuple[str, Floats]]) -> Path:
         return path
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
     starts = np.cumsum([0, *map(len, triangles)])
+    glazed = any(name.startswith("glass") for name in names)
+    if glazed:
+        path.with_suffix(".mtl").write_text("newmtl solid\nKd 1 1 1\nnewmtl glass\nd 0.2\n")
+        lines.insert(0, f"mtllib {path.stem}.mtl")
     for name, first, last in zip(names, starts[:-1], starts[1:], strict=True):
         lines.append(f"o {name}")
+        if glazed:
+            lines.append(f"usemtl {'glass' if name.startswith('glass') else 'solid'}")
         lines += [f"f {a} {b} {c}" for a, b, c in (faces[first:last] + 1).tolist()]
     path.write_text("\n".join(lines) + "\n")
     return path

@@ -87,3 +87,37 @@ def noisy(low: tuple[float, float, float], high: tuple[float, float, float], ste
             rough[1:-1, 1:-1] += rng.normal(0, step / 10, rough[1:-1, 1:-1].shape)
             faces.append(grid(rough))
     return np.concatenate(faces)
+
+
+def around(
+    x0: float, y0: float, x1: float, y1: float, wide: float, low: float, high: float
+) -> Floats:
+    """A frame of a width inside a rectangle in plan, such as a gallery, a parapet or a curb."""
+    return np.concatenate(
+        [
+            box((x0, y0, low), (x1, y0 + wide, high)),
+            box((x0, y1 - wide, low), (x1, y1, high)),
+            box((x0, y0 + wide, low), (x0 + wide, y1 - wide, high)),
+            box((x1 - wide, y0 + wide, low), (x1, y1 - wide, high)),
+        ]
+    )
+
+
+def shell(low: tuple[float, float, float], high: tuple[float, float, float]) -> Floats:
+    """A box without its bottom."""
+    sides = box(low, high)
+    return sides[(sides[:, :, 2] > low[2]).any(axis=1)]
+
+
+def pictures(x0: float, y0: float, x1: float, y1: float) -> Floats:
+    """Ten panels of 1.6 × 1.4 m, 4 cm thick and 2 to 5 cm off the walls of a room of 10 × 8 m."""
+    panels = []
+    for k in range(3):
+        x, off = x0 + 1 + 3.2 * k, 0.02 + 0.01 * k
+        panels.append(box((x, y0 + off, 0.9), (x + 1.6, y0 + off + 0.04, 2.3)))
+        panels.append(box((x, y1 - off - 0.04, 0.9), (x + 1.6, y1 - off, 2.3)))
+    for k in range(2):
+        y, off = y0 + 0.8 + 2.4 * k, 0.03 + 0.02 * k
+        panels.append(box((x0 + off, y, 0.9), (x0 + off + 0.04, y + 1.6, 2.3)))
+        panels.append(box((x1 - off - 0.04, y, 0.9), (x1 - off, y + 1.6, 2.3)))
+    return np.concatenate(panels)
