@@ -223,6 +223,7 @@ def _spaces_before(corners: Floats, scene: Scene, building: Building) -> Floats:
     up, down = (around.first(middle, np.full(middle.shape, [0, y, 0.0]))[0] for y in (1.0, -1.0))
     fits = (around.free_about(middle).min(axis=1) >= walker.radius) & (up + down >= walker.height)
     fits &= around.enclose(middle, roofed)
+    fits[fits] = ~around.solid_groups(middle[fits][:, None])
     result = np.full(start.shape, np.nan)
     result[some[fits]] = middle[fits]
     return result

@@ -29,7 +29,7 @@ from ptmtools.cells.planes import PlaneFrame, planes_of
 from ptmtools.cells.search import Bins, Nearby, Tries, connect
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
+from ptmtools.tolerance import GRAZING_COSINE, TIE_SHARE, Tolerance, rank
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,10 @@ _RAYS = 32
 #: A point is inside if at least this share of them meets a wall: under eaves half of them do.
 INSIDE = 0.75
 #: Points are inside a solid if at least this share of the walls around them faces away.
-_AWAY = 0.9
+AWAY = 0.9
+#: If fewer do, but this share, solids may overlap there: a few points tell, whose rays meet this
+#: many faces at most.
+_OVERLAP, _FEW, _FACES = 0.25, 4, 16
 #: Number of points that look at the walls around.
 LOOKS = 16
 #: Points whose level rays are shot at a time.
@@ -275,7 +278,7 @@ class Surroundings:
         front = normals(corners)
         length = np.linalg.norm(front, axis=1, keepdims=True)
         self._front = np.divide(front, length, out=np.zeros_like(front), where=length > 0)
-        self._scenes = []
+        self._scenes, self._step = [], tolerance.plane
         for step in (tolerance.plane, -tolerance.plane):
             local = (corners + step * self._front[:, None] - self._middle) * self._scale
             self._scenes.append(ray_tree(local))
@@ -289,6 +292,13 @@ class Surroundings:
 
     def solid_groups(self, points: Floats) -> Bools:
         """(g,) whether groups of points, (g, n, 3), are each inside a solid; see `solid`."""
+        return np.asarray(self.backs(points) >= AWAY)
+
+    def backs(self, points: Floats) -> Floats:
+        """(g,) the share of the walls around each group of points, (g, n, 3), that face away; NaN
+        without walls. Where solids overlap, such as a tower and the walls that end in it, not the
+        first face that a ray meets counts, but whether the ray leaves more solids than it enters.
+        """
         sums = np.zeros((len(points), 2), dtype=np.int64)  # of walls that are sure, and face away
         flat, group = points.reshape(-1, 3), np.repeat(np.arange(len(points)), points.shape[1])
         for first in range(0, len(flat), _AT_ONCE):
@@ -299,8 +309,31 @@ class Surroundings:
             sure = (hit >= 0).all(axis=0) & (away[0] == away[1])
             counts = np.stack([sure, sure & away[0]]).reshape(2, -1, _RAYS).sum(axis=2)
             np.add.at(sums, group[first : first + _AT_ONCE], counts.T)
-        result: Bools = (sums[:, 0] > 0) & (sums[:, 1] >= _AWAY * sums[:, 0])
-        return result
+        share = np.where(sums[:, 0] > 0, sums[:, 1] / np.maximum(sums[:, 0], 1), np.nan)
+        doubtful = np.flatnonzero((share >= _OVERLAP) & (share < AWAY))
+        few = points[:, :: max(1, -(-points.shape[1] // _FEW))]
+        for first in range(0, len(doubtful), _AT_ONCE // _FEW):
+            rows = doubtful[first : first + _AT_ONCE // _FEW]
+            some = few[rows].reshape(-1, 3)
+            along = np.tile(self._level[::2], (len(some), 1))
+            depth = self._depth(np.repeat(some, _RAYS // 2, axis=0), along)
+            inside = (depth > 0).reshape(len(rows), -1).mean(axis=1)
+            share[rows] = np.where(inside >= INSIDE, 1.0, share[rows])
+        return share
+
+    def _depth(self, points: Floats, along: Floats) -> Ints:
+        """(n,) how many more solids rays from (n, 3) points along (n, 3) leave than they enter."""
+        depth, live, points = np.zeros(len(points), np.int64), np.arange(len(points)), points.copy()
+        for _ in range(_FACES):
+            way, facing = self.first(points[live], along[live])
+            met = np.isfinite(way)
+            live, way = live[met], way[met]
+            turn = np.einsum("ij,ij->i", along[live], facing[met])
+            depth[live] += np.where(turn > 0, 1, -1)
+            # Faces that touch are moved apart: the next ray begins behind the first of them only.
+            beyond = self._step * (np.sign(turn) + 0.5) / np.maximum(np.abs(turn), GRAZING_COSINE)
+            points[live] += (way + beyond)[:, None] * along[live]
+        return depth
 
     def have_floor(self, points: Floats) -> Bools:
         """(n,) whether the surface straight below each of (n, 3) points faces up."""

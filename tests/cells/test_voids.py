@@ -11,8 +11,10 @@ from ptmtools.arrays import Floats
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cells.building import Building
 from ptmtools.cells.space import divide, is_open_to_sight
+from ptmtools.cells.structure import Surroundings
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.orientation.space import to_world
+from ptmtools.tolerance import Tolerance
 from tests.cells.buildings import AXES, carved, room, write
 from tests.cells.strangers import Parts, galleries, office, serpentine, street
 from tests.scene.buildings import box
@@ -80,3 +82,22 @@ def test_sight_shows_what_a_division_would(parts: Parts, shows: bool, tmp_path: 
     building = Building.from_scene(scene, SubdivideOptions())
     assert is_open_to_sight(building) == shows
     assert not (shows and divide(building, building.wide).closed)
+
+
+def test_solids_that_overlap() -> None:
+    """The middle of a tower in which two walls end is solid; a room between walls that overlap at
+    its corners is not."""
+    tower = box((-1, -1, 0), (5, 5, 9)), box((0, 0, 0), (2, 30, 6)), box((0, 0, 0), (30, 2, 6))
+    walls = [box((0, k, 0), (9, k + 1, 3)) for k in (0, 8)]
+    walls += [box((k, 0, 0), (k + 1, 9, 3)) for k in (0, 8)]
+    for solids, points, solid in (
+        (tower, [[3.5, 3.5, 1], [1, 1, 1], [1, 4, 5]], True),
+        (tower, [[9, 9, 1], [4, 7, 1]], False),
+        (walls, [[4, 4, 1], [2, 7, 1]], False),
+        (walls, [[0.5, 0.5, 1], [8.5, 0.5, 2]], True),
+    ):
+        corners = np.concatenate(solids)[..., [1, 2, 0]]
+        around = Surroundings(corners, Tolerance.for_extent(30.0))
+        assert around.solid_groups(np.array(points)[:, None, [1, 2, 0]]).tolist() == (
+            [solid] * len(points)
+        )
