@@ -2,8 +2,9 @@
 ground, a low hollow such as a plenum, or the inside of a solid.
 
 Level rays and a ray upwards from the height of the eye decide. Glass and furniture count as walls:
-a room with a glass front is a room. Where most enclosed space seems solid, faces are turned out of
-rooms, and their sense tells nothing (`Surroundings.solid`).
+a room with a glass front is a room. Where most space under the sky seems solid, or most enclosed
+space if none is under the sky, faces are turned out of rooms, and their sense tells nothing
+(`Surroundings.solid`); but a town of solid houses has no other enclosed space.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.structure import Surroundings
+from ptmtools.cells.structure import AWAY, Surroundings
 
 #: Least and greatest clear height of a room, metres.
 CLEAR = 2.0, 12.0
@@ -49,8 +50,10 @@ def space_kinds(
     votes = np.zeros((count, len(SpaceKind)), dtype=np.int64)
     np.add.at(votes, (np.repeat(np.arange(count), looks), kind), 1)
     result: Ints = votes.argmax(axis=1)
-    solid = around.solid_groups(points)
-    enclosed = weight * (result <= SpaceKind.HALL)
-    if enclosed[solid].sum() <= enclosed.sum() / 2:
+    backs = around.backs(points)
+    solid, sure = backs >= AWAY, np.isfinite(backs)
+    sky = sure & np.isin(result, (SpaceKind.COURT, SpaceKind.OPEN))
+    judges = weight * (sky if sky.any() else sure & (result <= SpaceKind.HALL))
+    if judges[solid].sum() <= judges.sum() / 2:
         result[solid] = SpaceKind.SOLID
     return result
