@@ -18,7 +18,7 @@ from ptmtools.arrays import Bools, Floats, Ints, sum_by_group
 from ptmtools.cells.bsp import SplitPlanes, Tree, build_tree
 from ptmtools.cells.building import Building, points_beside
 from ptmtools.cells.doors import THICK, open_doors
-from ptmtools.cells.floors import ceiling_plane
+from ptmtools.cells.floors import ROOFED, ceiling_plane
 from ptmtools.cells.model import descend
 from ptmtools.cells.named_rooms import split_at
 from ptmtools.cells.options import SubdivideOptions
@@ -142,7 +142,8 @@ def find_unreached(
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
     if not ((waiting | outside).any() and len(structure.corners)):
         return Unreached([])
-    standing = Standing.from_tree(tree, waiting, building)
+    reachable = replace(building, places=building.places.only(building.has_way))
+    standing = Standing.from_tree(tree, waiting, reachable)
     around = structure.around
     # Apart, since the ground may be so large that few samples on it are in a building.
     sheltered = Standing.from_tree(tree, outside & ~outer, building)
@@ -156,10 +157,11 @@ def find_unreached(
     volumes = np.array([body.volume for body in tree.leaves]) * reached
     middles = np.array([tree.leaves[i].points.mean(axis=0) for i in rank(volumes)[:LOOKS]])
     recognisable = not around.solid(middles)
-    rooms = []
+    rooms, roofed = [], building.doors.floor.roof_share >= ROOFED
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
         points = spread_over(room.points, _CHOICE)
-        indoors = points[around.enclose(points)]  # outside, walls without a back face away
+        # Outside, walls without a back face away; where rooms have no roof, a roof is furniture.
+        indoors = points[around.enclose(points, roofed)]
         points = spread_over(indoors if len(indoors) else points, LOOKS)
         leaves = np.flatnonzero(group == group[room.leaf[0]])
         # The inside of a shut door leaf is no room.
