@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import WALKER
-from ptmtools.cells.room_kinds import space_kinds
+from ptmtools.cells.room_kinds import SpaceKind, space_kinds
 from ptmtools.cells.structure import Surroundings
 from ptmtools.output.model import EYE, Vector
 from ptmtools.output.storeys import area, leaf_section
@@ -93,6 +93,8 @@ _PER_ROOM = 4
 _GRID = 7
 #: Places of a leaf whose views are compared, the freest first.
 _TRIES = 12
+#: A roof is no thicker than this, metres for the default visitor.
+_SLAB = 1.0
 #: A walk may begin in a room with at least this share of the largest floor.
 _AS_LARGE = 0.5
 #: A browser stands on the highest surface around the eye: X_ITE in a square of half that side,
@@ -197,8 +199,8 @@ def largest_leaves(cells: Cells, count: int, ranks: NDArray[np.int64] | None = N
 
 
 def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArray[np.int64]:
-    """(L,) the rank of each leaf: 0 of rooms with a name, else its `SpaceKind` and 1; that of
-    leaves that do not stand is meaningless."""
+    """(L,) the rank of each leaf: 0 of rooms with a name, else by its `SpaceKind`, roofs after the
+    ground; that of leaves that do not stand is meaningless."""
     result = np.zeros(cells.leaf_count, dtype=np.int64)
     named = np.array([bool(cells.room_name(cell)) for cell in range(cells.cell_count)] + [False])
     leaves = np.flatnonzero(cells.leaf_standing & ~named[cells.leaf_cell])
@@ -216,7 +218,14 @@ def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArr
     around = Surroundings(scene.corners, scene.tolerance)
     volume = cells.leaf_volumes()[leaves]
     scale = eye / (WALKER.height * EYE)
-    result[leaves] = 1 + space_kinds(around, points, height, volume, scale)
+    kind = space_kinds(around, points, height, volume, scale)
+    # A roof, or a terrace, has a floor below.
+    below = points.copy()
+    below[:, :, 1] = (points[:, :, 1].T - height - _SLAB * scale).T
+    down = np.tile([0.0, -1.0, 0.0], (below.size // 3, 1))
+    floors = np.isfinite(around.first(below.reshape(-1, 3), down)[0]).reshape(len(leaves), -1)
+    roof = np.isin(kind, (SpaceKind.COURT, SpaceKind.OPEN)) & (floors.mean(axis=1) > 0.5)
+    result[leaves] = 1 + 2 * kind + roof
     return result
 
 
