@@ -212,7 +212,7 @@ class Building:
         structure = self.structure
         points, size = spread(self.places.triangles(structure.tolerance))
         points = spread_over(points, _SAMPLES) + [0.0, self.walker.middle, 0.0]
-        around = structure.around
+        around = structure.rays
         inside = around.enclose(points)
         some = spread_over(points[inside], LOOKS)
         hollow = np.mean([not around.solid(point[None]) for point in some]) if len(some) else 0.0
@@ -226,7 +226,7 @@ class Building:
         solid = ~structure.door | (self.options.doors == "closed")
         if self.options.standing != "places" or not solid.any():
             return np.ones(len(self.places.plan), dtype=np.bool_)
-        around = structure.around
+        around = structure.rays
         if not solid.all():
             around = Surroundings(structure.corners[solid], tolerance)
         eyes = np.array([*self.options.viewpoints, *self.cameras.tolist()]).reshape(-1, 3)
@@ -237,7 +237,7 @@ class Building:
         """The surroundings in which glass counts as a wall."""
         structure = self.structure
         if not len(self.doors.glass):
-            return structure.around
+            return structure.rays
         walls = np.concatenate([structure.corners, self.doors.glass])
         return Surroundings(walls, structure.tolerance)
 

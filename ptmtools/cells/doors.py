@@ -308,7 +308,7 @@ class Doors:
 
     def find_sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have walls around and a roof above the ways on both sides."""
-        around = structure.around
+        around = structure.rays
         if len(self.glass):
             corners = np.concatenate([structure.corners, self.glass])
             around = Surroundings(corners, structure.tolerance)

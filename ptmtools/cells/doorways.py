@@ -188,7 +188,7 @@ def close_openings(slabs: Slabs, structure: Structure, wall_thickness: float) ->
     fits = (wide >= OPENING_WIDTH[0] - slack) & (wide <= OPENING_WIDTH[1] + slack)
     result = np.zeros(len(slabs), dtype=bool)
     if fits.any():
-        rays = _Rays(slabs.only(fits), structure.around)
+        rays = _Rays(slabs.only(fits), structure.rays)
         result[fits] = _closes_by_rays(rays, wall_thickness)
     return result
 
@@ -197,7 +197,7 @@ def free_on_both_sides(slabs: Slabs, structure: Structure) -> Bools:
     """(k,) which slabs have room on both sides, unlike a door on a wall or open against it."""
     if not (len(slabs) and len(structure.corners)):
         return np.ones(len(slabs), dtype=bool)
-    return _Rays(slabs, structure.around).free()
+    return _Rays(slabs, structure.rays).free()
 
 
 def _closes_by_rays(rays: _Rays, wall_thickness: float) -> Bools:

@@ -162,7 +162,7 @@ class SampledFloor:
             return SampledFloor(np.zeros(0), np.zeros(0, dtype=bool))
         among = low[tall].min(axis=0)[PLAN], high[tall].max(axis=0)[PLAN]
         eyes = sample(_parts_in(corners[level], *among), _POINTS) + [0.0, apart, 0.0]
-        around = structure.around
+        around = structure.rays
         wide = around.free_about(eyes)
         eyes = eyes[(np.isfinite(wide).mean(axis=1) >= INSIDE) & (wide.min(axis=1) >= radius)]
         return SampledFloor(eyes[:, 1] - apart, around.cover(eyes))

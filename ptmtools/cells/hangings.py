@@ -66,17 +66,17 @@ class _Surfaces:
         ring = shapely.get_exterior_ring(self.shape[number])
         return self.frame[number].to_space(shapely.get_coordinates(ring))
 
-    def way(self, number: int, other: int) -> tuple[Floats, float]:
+    def way(self, number: int, behind: int) -> tuple[Floats, float]:
         """(3,) the unit vector from one to the plane of another, and the greatest distance, metres;
         0 if it is on both sides of that plane."""
-        plane = self.plane[other]
+        plane = self.plane[behind]
         height = self.outline(number) @ plane[:3] + plane[3]
         gap = 0.0 if np.ptp(np.sign(height)) else float(np.abs(height).max())
         return -np.sign(height[0]) * plane[:3], gap
 
-    def covers(self, number: int, other: int, tolerance: Tolerance) -> bool:
+    def covers(self, number: int, covered: int, tolerance: Tolerance) -> bool:
         """Whether one is before or behind most of another."""
-        flat = shapely.polygons(self.frame[number].to_plane(self.outline(other)))
+        flat = shapely.polygons(self.frame[number].to_plane(self.outline(covered)))
         common = intersection(flat, self.shape[number], tolerance.grid)
         return bool(shapely.area(common) >= _COVERED * shapely.area(flat))
 
@@ -87,8 +87,8 @@ class _Surfaces:
         near = structure.nearby.find_between(plane, -slack, slack)
         corners = structure.corners[near[structure.areas[near] >= least]]
         height = corners @ plane[:3] + plane[3]
-        far = np.abs(height).max(axis=1) > distance
-        corners, height = corners[far], height[far]
+        reaching = np.abs(height).max(axis=1) > distance
+        corners, height = corners[reaching], height[reaching]
         rows, points = shadows(
             self.frame[number].to_plane(corners), height, (-slack, slack), np.arange(len(corners))
         )
@@ -103,7 +103,7 @@ class _Surfaces:
         one_way = 2 * np.linalg.norm(total) > np.linalg.norm(facing, axis=1).sum()
         return total if one_way else np.zeros(3)
 
-    def beside(self, number: int, distance: float) -> Floats:
+    def edge_points(self, number: int, distance: float) -> Floats:
         """(n, 3) points spread along the edge of one, at a distance outside."""
         hull = shapely.convex_hull(self.shape[number])
         ring = shapely.get_exterior_ring(buffer(hull, distance, quad_segs=1))
@@ -120,30 +120,30 @@ def without_hangings(
     backs: list[tuple[int, int]] = []
     fronts: dict[int, list[int]] = {}  # of hangings, by the wall that they are before
     for number in range(len(surfaces.wall)):
-        for other in surfaces.candidates(number, distance).tolist():
-            toward, gap = surfaces.way(number, other)
-            if not 0 < gap <= distance or not surfaces.covers(other, number, structure.tolerance):
+        for behind in surfaces.candidates(number, distance).tolist():
+            toward, gap = surfaces.way(number, behind)
+            if not 0 < gap <= distance or not surfaces.covers(behind, number, structure.tolerance):
                 continue
-            if surfaces.facing(structure, other) @ toward >= 0:
+            if surfaces.facing(structure, behind) @ toward >= 0:
                 continue
             if surfaces.facing(structure, number) @ toward > 0:
-                backs.append((number, other))
+                backs.append((number, behind))
                 continue
-            beside = surfaces.beside(number, _BESIDE * distance)
+            beside = surfaces.edge_points(number, _BESIDE * distance)
             if not surfaces.meets_large(
                 structure, number, _LARGE * wall_area, distance
-            ) and _is_free(structure.around, beside, toward, gap, distance):
-                fronts.setdefault(other, []).append(number)
+            ) and _is_free(structure.rays, beside, toward, gap, distance):
+                fronts.setdefault(behind, []).append(number)
     hanging = np.zeros(len(surfaces.wall), dtype=np.bool_)
     hanging[[number for numbers in fronts.values() for number in numbers]] = True
-    for number, other in backs:
-        gap = surfaces.way(number, other)[1]
+    for number, behind in backs:
+        gap = surfaces.way(number, behind)[1]
         hanging[number] |= any(
-            surfaces.way(front, other)[1] > gap
+            surfaces.way(front, behind)[1] > gap
             and surfaces.covers(front, number, structure.tolerance)
-            for front in fronts.get(other, ())
+            for front in fronts.get(behind, ())
         )
-    return _without(walls, surfaces, hanging)
+    return _leave_out(walls, surfaces, hanging)
 
 
 def _is_free(
@@ -158,8 +158,8 @@ def _is_free(
     return bool(free.mean() >= _FREE)
 
 
-def _without(walls: list[WallPlane], surfaces: _Surfaces, hanging: Bools) -> list[WallPlane]:
-    """The walls without some polygons; those that hold no other are left out."""
+def _leave_out(walls: list[WallPlane], surfaces: _Surfaces, hanging: Bools) -> list[WallPlane]:
+    """The walls without some polygons; those that hold no more are left out."""
     result = []
     touched = set(surfaces.wall[hanging].tolist())
     for number, wall in enumerate(walls):

@@ -248,7 +248,7 @@ def largest_leaf(
     hollow: Iterable[int] = ()
     outwards = bool(order) and _outwards(corners)
     if outwards:
-        around = structure.around
+        around = structure.rays
         floored = around.have_floor(np.array(list(middle.values())))
         hollow = (leaf for leaf in compress(order, floored) if not around.solid(middle[leaf][None]))
     for leaves, solid in ((hollow, False), (order, outwards)):

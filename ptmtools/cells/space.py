@@ -144,7 +144,7 @@ def find_unreached(
         return Unreached([])
     reachable = replace(building, places=building.places.only(building.has_way))
     standing = Standing.from_tree(tree, waiting, reachable)
-    around = structure.around
+    around = structure.rays
     # Apart, since the ground may be so large that few samples on it are in a building.
     sheltered = Standing.from_tree(tree, outside & ~outer, building)
     sheltered = sheltered.append(Standing.from_tree(tree, outside & outer, building))
@@ -251,7 +251,7 @@ def is_open_to_sight(building: Building) -> bool:
     if not (len(points) and len(structure.corners)):
         return False
     points += [0.0, building.walker.middle, 0.0]
-    around = structure.around
+    around = structure.rays
     sees_out = around.see_out(points)
     if not structure.door.any():
         count = np.bincount(region[row])
@@ -338,7 +338,7 @@ def _is_elsewhere(
     as much if the void is a ``solid``; or that is hardly bounded by surfaces of the model.
     ``outer``: (L,) which leaves are at the box."""
     structure = building.structure
-    around = structure.around
+    around = structure.rays
     if not solid:
         largest = rank(np.array([body.volume for body in tree.leaves]) * reached)[:LOOKS]
         middle = [tree.leaves[leaf].points.mean(axis=0) for leaf in largest if reached[leaf]]

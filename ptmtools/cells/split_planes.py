@@ -265,11 +265,11 @@ def _see_through(outline: Floats, triangles: Floats, width: float) -> bool:
     its plane is met by trying few: a test in no time that most sections with an opening pass."""
     middle = outline.mean(axis=0)
     points = np.concatenate([[middle], *(middle + t * (outline - middle) for t in _TRIED)])
-    inside = -_beyond(points, outline[None])[:, 0] >= width
-    return bool((_beyond(points[inside], triangles) >= width).all(axis=1).any())
+    inside = -_overhangs(points, outline[None])[:, 0] >= width
+    return bool((_overhangs(points[inside], triangles) >= width).all(axis=1).any())
 
 
-def _beyond(points: Floats, polygons: Floats) -> Floats:
+def _overhangs(points: Floats, polygons: Floats) -> Floats:
     """(p, n) how far (p, 2) points are beyond the edges of convex polygons, (n, k, 2), in any
     sense: no more than the distance outside, and no less than minus the one inside."""
     along = np.roll(polygons, -1, axis=1) - polygons

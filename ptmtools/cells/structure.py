@@ -92,10 +92,10 @@ class Structure:
         )
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in vars(self).items() if name != "around"}
+        return {name: value for name, value in vars(self).items() if name != "rays"}
 
     @cached_property
-    def around(self) -> Surroundings:
+    def rays(self) -> Surroundings:
         """Rays among the triangles."""
         return Surroundings(self.corners, self.tolerance)
 

@@ -322,7 +322,7 @@ def _find_buried(building: Building, points: Floats, eye_floor: Floats) -> Float
     structure = building.structure
     if not (len(points) and len(eye_floor)):
         return points[:0]
-    around = structure.around
+    around = structure.rays
     body = eye_floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
     if around.solid(spread_over(body, LOOKS)):
         return points[:0]

@@ -115,7 +115,7 @@ def _for_most(is_kind: Bools, region: Ints, weight: Floats, count: int) -> Bools
 def _joins(places: Places, around: Surroundings, walker: Walker) -> Ints:
     """(p, 2) pairs of regions that are joined, as many as connect all that are."""
     plan, slope = places.plan, places.slope
-    joins = _with_a_corner(places, walker)
+    joins = _corner_pairs(places, walker)
     pairs = _near_pairs(places, walker, _TOUCH, connect(len(plan), joins))
     steep = np.flatnonzero(np.any(slope[pairs[:, 0], :2] != slope[pairs[:, 1], :2], axis=1))
     meet = _meet(places, pairs[steep], walker)
@@ -144,7 +144,7 @@ def _ends_of_lines(plan: Geometry, pairs: Ints, count: int) -> tuple[Floats, Int
     return point[some], row[some]
 
 
-def _with_a_corner(places: Places, walker: Walker) -> Ints:
+def _corner_pairs(places: Places, walker: Walker) -> Ints:
     """(p, 2) pairs of regions with corners in one place, not a step apart: most of a scan."""
     point, region = shapely.get_coordinates(places.plan, return_index=True)
     height = _height(point, places.slope[region])
