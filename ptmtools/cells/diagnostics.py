@@ -84,7 +84,7 @@ def _door_notes(leaves: list[DoorLeaf], opened: Bools, doors: DoorState) -> list
     notes = []
     for which, state in (
         (opened, _OPEN[doors]),
-        (~opened, "shut: no walkable floor lies beyond; --detail NAME opens it"),
+        (~opened, "shut: beyond is the outside or no walkable floor; --detail NAME opens it"),
     ):
         chosen = [leaves[i] for i in np.flatnonzero(which)]
         if chosen:
