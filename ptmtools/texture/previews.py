@@ -4,8 +4,8 @@ For the error that a visitor sees over a thin link, an exact level takes ten tim
 lossy image of it. So a texture has three kinds of steps: the coarsest levels, exact; previews,
 which browsers decode by themselves; the exact levels. A preview stands alone: it needs no other
 bytes. A texture whose source is lossy already keeps the bytes of that image as its finest step and
-has no lossless copy. One whose exact levels exceed its file, as those of most images with a palette
-do, has its finest level as a lossless image instead.
+has no lossless copy. A PNG with a palette that its exact levels exceed has its finest level as a
+lossless image instead.
 
 `benchmarks/codec/previews.py` prints the bytes and errors behind these choices:
 
@@ -128,8 +128,8 @@ class PreviewOptions:
         "lossless-sources",
         "Textures with lossless levels: always all of them; lossless-sources those whose images "
         "are lossless, while a JPEG, lossy WebP or AVIF is sent as it is, or as a preview of as "
-        "many bytes if browsers do not read it, and an image that is smaller than its levels as "
-        "lossless WebP; never none, and the finest preview is the finest level.",
+        "many bytes if browsers do not read it, and a PNG with a palette that is smaller than its "
+        "levels as lossless WebP; never none, and the finest preview is the finest level.",
         basic=True,
     )
 

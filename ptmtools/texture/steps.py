@@ -5,9 +5,9 @@ only the coarsest levels, and previews of the levels between fill the rest of a 
 A lossy source that browsers do not read, or that was converted, has a preview of as many bytes
 instead: exact levels would repeat its losses in four times the bytes.
 
-A lossless source whose exact levels and previews exceed its file has its finest level as lossless
-WebP: images with a palette take 0.8 to 1.0 of their PNG so, and 1.2 to 1.7 as levels, which code
-colours and not their places in the palette. The finest level has a lossy preview besides, since a
+A PNG with a palette that its exact levels and previews exceed has its finest level as lossless
+WebP: it takes 0.8 to 1.0 of the PNG so, and 1.2 to 1.7 as levels, which code colours and not their
+places in the palette. The finest level has a lossy preview besides, since a
 lossless image is of no use before its last byte.
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.images import Picture
     from ptmtools.texture.model import EncodeOptions
+
+#: The beginning of a PNG whose texels are places in a palette (RFC 2083, 4.1.1).
+_PALETTE = re.compile(rb"\x89PNG\r\n\x1a\n.{17}\x03", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -129,11 +133,13 @@ class _StepsEncoder:
         )
 
     def _lossless_level(self, size: int) -> tuple[Preview, bytes] | None:
-        """The finest level as a lossless image, if its exact levels, of ``size`` bytes, and their
-        previews exceed the source; None also where that image saves little."""
+        """The finest level as a lossless image, if the source is a PNG with a palette, which its
+        exact levels, of ``size`` bytes, and their previews exceed; None also where that image saves
+        little."""
         texels, source = self._texels, len(self._source)
         if (
-            not (self._is_whole and source and self._previews.exact == "lossless-sources")
+            not (self._is_whole and self._previews.exact == "lossless-sources")
+            or _PALETTE.match(self._source) is None
             or (1 + BESIDE) * size < source + WORTH_SAVING
             or texels.dtype.itemsize > 1
             or max(texels.shape) > FORMATS[LOSSLESS].side
