@@ -42,14 +42,14 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (72_285, 351),
+    "ptmtools": (72_331, 351),
     "ptmtools/*.py": (4_150, 26),
-    "ptmtools/cells": (8_757, 29),
+    "ptmtools/cells": (8_796, 29),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_500, 15),
     "ptmtools/light": (3_395, 15),
     "ptmtools/meshopt": (870, 5),
-    "ptmtools/output": (8_166, 39),
+    "ptmtools/output": (8_167, 39),
     "ptmtools/pipeline": (4_052, 20),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (2_040, 13),
@@ -58,7 +58,7 @@ BUDGET: dict[str, tuple[int, int]] = {
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_640, 25),
     "ptmtools/store": (2_230, 13),
-    "ptmtools/texture": (10_273, 44),
+    "ptmtools/texture": (10_279, 44),
     "ptmtools/tour": (1_340, 8),
     "ptmtools/visibility": (960, 6),
     "ptmtools_lab": (11_660, 51),

@@ -190,8 +190,8 @@ class _Growth:
         if task.source == _DOORS:
             self._hung.add(node)
         self._place(task.parent, node)
-        capping = task.caps
-        if task.source == _CAPS:  # which close the section of a part, too
+        capping = task.caps  # caps of a body are caps of its parts
+        if task.source == _CAPS:
             capping = [f.wall for i, f in enumerate(task.fragments) if i != task.best]
         extents = _Extents(task.fragments)
         ahead = [extents.ahead(facing, tolerance) for facing in (plane, -plane)]

@@ -148,6 +148,7 @@ class Building:
     furniture: tuple[str, ...]  # the objects with detail by shape, those with most of it first
     shaped: int  # triangles of detail by shape
     facets: int  # planes of a scanned surface, which do not split
+    hangings: int  # polygons before larger walls, which do not either
 
     @staticmethod
     def from_scene(
@@ -157,9 +158,11 @@ class Building:
         fabric = Fabric.from_scene(scene, options)
         doors, structure = Doors.recognise(fabric, Structure.from_fabric(fabric, tolerance))
         every = flat = walls = find_walls(structure, options.wall_area)
+        hangings = 0
         if not options.structural:
             flat = without_facets(every)
-            walls = without_hangings(flat, structure, options.wall_area, options.wall_thickness)
+            sizes = options.wall_area, options.wall_thickness
+            walls, hangings = without_hangings(flat, structure, *sizes)
         walker = Walker(*options.walker)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
         floors = Floors.from_fabric(fabric, GRAIN * walker.radius)
@@ -187,6 +190,7 @@ class Building:
             furniture=tuple(scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]),
             shaped=len(shaped),
             facets=len(every) - len(flat),
+            hangings=hangings,
         )
 
     @property

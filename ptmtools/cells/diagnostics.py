@@ -37,7 +37,8 @@ NO_PLACES = Warned(
 
 
 def building_notes(building: Building) -> Iterator[str]:
-    """Notes on detail by shape, on volumes of rooms and on the planes of a scanned surface."""
+    """Notes on detail by shape, on volumes of rooms, on the planes of a scanned surface and on what
+    hangs on walls."""
     if building.furniture:
         objects = count(len(building.furniture), "object")
         yield (
@@ -50,6 +51,12 @@ def building_notes(building: Building) -> Iterator[str]:
         yield (
             f"{building.facets:,} flat pieces lean in all directions, like a scan or terrain, and "
             "do not divide space; --structural NAME makes objects do so"
+        )
+    if building.hangings:
+        surfaces = count(building.hangings, "surface")
+        yield (
+            f"{surfaces} before a larger wall or floor, such as pictures, do not divide space; "
+            "--structural NAME makes all do so"
         )
 
 
@@ -141,6 +148,12 @@ def _unreached_notes(building: Building, space: DividedSpace) -> list[str]:
         every = float(Standing.from_tree(space.tree, space.reached, building).place.sum())
         if sum(room.place for room in rooms) > MUCH * every:
             notes[0] = Warned(notes[0])
+    if low := space.beyond.low:
+        size = sum(room.place for room in low)
+        notes.append(
+            f"{count(len(low), 'closed area')}, {size:.1f} m² in total, such as {_place(low[0])}: "
+            "left out as plenums, or rooms lower than 2 m; --standing floors keeps them"
+        )
     if outside:
         notes.append(
             Warned(

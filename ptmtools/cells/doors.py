@@ -308,10 +308,11 @@ class Doors:
 
     def find_sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have walls around and a roof above the ways on both sides."""
-        around = structure.rays
         if len(self.glass):
             corners = np.concatenate([structure.corners, self.glass])
             around = Surroundings(corners, structure.tolerance)
+        else:
+            around = structure.rays
         ways = (_ways(door, around) for door in self.leaves)
         roofed = self.floor.roof_share >= ROOFED
         enclosed = [all(around.enclose(points, roofed).all() for points in way) for way in ways]

@@ -31,7 +31,7 @@ _PARALLEL = 0.9998
 #: A triangle is large from this share of the least area of walls on.
 _LARGE = 0.25
 #: Points along the edge, so far from it, as a share of the greatest distance; at least this share
-#: of them see the wall behind, and as far as that many of the greatest distances to the other side.
+#: of them see the wall behind, and on the other side nothing nearer than `_ROOM` times it.
 _POINTS, _BESIDE, _FREE, _ROOM = 32, 0.2, 0.55, 1.0
 
 
@@ -75,10 +75,15 @@ class _Surfaces:
         return -np.sign(height[0]) * plane[:3], gap
 
     def covers(self, number: int, covered: int, tolerance: Tolerance) -> bool:
-        """Whether one is before or behind most of another."""
+        """Whether one is before or behind most of another, without an opening there."""
         flat = shapely.polygons(self.frame[number].to_plane(self.outline(covered)))
-        common = intersection(flat, self.shape[number], tolerance.grid)
-        return bool(shapely.area(common) >= _COVERED * shapely.area(flat))
+        hull = shapely.convex_hull(self.shape[number])
+        common, within = (
+            float(shapely.area(intersection(flat, shape, tolerance.grid)))
+            for shape in (self.shape[number], hull)
+        )
+        closed = within - common <= tolerance.hairline**2
+        return closed and common >= _COVERED * float(shapely.area(flat))
 
     def meets_large(self, structure: Structure, number: int, least: float, distance: float) -> bool:
         """Whether a triangle of at least this area, m², that reaches farther than a distance from
@@ -114,8 +119,9 @@ class _Surfaces:
 
 def without_hangings(
     walls: list[WallPlane], structure: Structure, wall_area: float, wall_thickness: float
-) -> list[WallPlane]:
-    """The walls without the polygons that hang on others; see the module's head."""
+) -> tuple[list[WallPlane], int]:
+    """The walls without the polygons that hang on others, and the number of these; see the module's
+    head."""
     surfaces, distance = _Surfaces.of_walls(walls), _OFF * wall_thickness
     backs: list[tuple[int, int]] = []
     fronts: dict[int, list[int]] = {}  # of hangings, by the wall that they are before
@@ -143,7 +149,7 @@ def without_hangings(
             and surfaces.covers(front, number, structure.tolerance)
             for front in fronts.get(behind, ())
         )
-    return _leave_out(walls, surfaces, hanging)
+    return _leave_out(walls, surfaces, hanging), int(hanging.sum())
 
 
 def _is_free(

@@ -167,7 +167,7 @@ def _openings(
     every = shared[0] if len(shared) == 1 else union(shared, tolerance.grid, more=True)
     if wall.barring is None and shapely.covered_by(every, wall.blocking):
         return
-    free = shapely.disjoint(wall.blocking, every)  # which is prepared
+    free = shapely.disjoint(wall.blocking, every) and _wider_than(every, tolerance.hairline)
     opening = every if free else open_part(every, wall.blocking, tolerance)
     openings = [(opening, False)]
     if wall.barring is not None:

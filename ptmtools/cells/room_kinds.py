@@ -4,7 +4,8 @@ ground, a low hollow such as a plenum, or the inside of a solid.
 Level rays and a ray upwards from the height of the eye decide. Glass and furniture count as walls:
 a room with a glass front is a room. Where most space under the sky seems solid, or most enclosed
 space if none is under the sky, faces are turned out of rooms, and their sense tells nothing
-(`Surroundings.solid`); but a town of solid houses has no other enclosed space.
+(`Surroundings.solid`). Enclosed space alone cannot tell, since a town of solid houses has no other.
+A shell with openings is hollow, whatever its faces say.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from enum import IntEnum
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.structure import AWAY, Surroundings
+from ptmtools.cells.structure import AWAY, INSIDE, Surroundings
 
 #: Least and greatest clear height of a room, metres.
 CLEAR = 2.0, 12.0
@@ -39,7 +40,8 @@ def space_kinds(
     its area. ``scale``: see `Walker.scale`."""
     count, looks = points.shape[:2]
     flat = points.reshape(-1, 3)
-    walled = around.enclose(flat, roofed=False)
+    met = around.walls_met(flat)
+    walled = met >= INSIDE
     up = around.first(flat, np.tile([0.0, 1.0, 0.0], (len(flat), 1)))[0]
     clear = (up + np.repeat(height, looks)) / scale
     kind = np.select(
@@ -55,5 +57,6 @@ def space_kinds(
     sky = sure & np.isin(result, (SpaceKind.COURT, SpaceKind.OPEN))
     judges = weight * (sky if sky.any() else sure & (result <= SpaceKind.HALL))
     if judges[solid].sum() <= judges.sum() / 2:
-        result[solid] = SpaceKind.SOLID
+        sealed = (met.reshape(count, looks) == 1).all(axis=1)
+        result[solid & sealed] = SpaceKind.SOLID
     return result

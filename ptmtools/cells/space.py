@@ -52,7 +52,7 @@ _GARDEN = 4.0
 #: A model of solids has less walled floor around them than this many times that inside of them.
 _PLATE = 0.5
 #: Points of floor from which lines of sight tell whether a building is open, and the share of those
-#: in one region that must not be mistaken: rays pass through cracks.
+#: of a region from which on rays that leave do not merely pass cracks.
 _SIGHTS, _SEES_OUT = 4096, 0.05
 #: A void is hardly the building if less than this share of the model's surfaces bounds it.
 _HARDLY = 0.1
@@ -107,6 +107,7 @@ class Unreached:
 
     rooms: list[UnreachedRoom]  # the largest first
     outside: UnreachedRoom | None = None  # in a building, but outside the closed model
+    low: tuple[UnreachedRoom, ...] = ()  # to which no way leads, such as plenums; left out
 
     def remove_reached(self, reached: Bools, portals: list[Portal]) -> Unreached:
         """The rest once the flood reaches the (L,) leaves ``reached`` through more ``portals``;
@@ -122,7 +123,7 @@ class Unreached:
             )
             for name, parts in connected_rooms.items()
         ]
-        return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
+        return replace(self, rooms=sorted(rooms, key=lambda room: -room.place))
 
     def add_to(self, reached: Bools) -> Bools:
         """(L,) the ``reached`` leaves, (L,), and those of unreachable rooms."""
@@ -142,8 +143,10 @@ def find_unreached(
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
     if not ((waiting | outside).any() and len(structure.corners)):
         return Unreached([])
+    standing = Standing.from_tree(tree, waiting, building)
     reachable = replace(building, places=building.places.only(building.has_way))
-    standing = Standing.from_tree(tree, waiting, reachable)
+    with_way = Standing.from_tree(tree, waiting, reachable)
+    place = sum_by_group(group[with_way.leaf], with_way.place, len(group))
     around = structure.rays
     # Apart, since the ground may be so large that few samples on it are in a building.
     sheltered = Standing.from_tree(tree, outside & ~outer, building)
@@ -157,7 +160,9 @@ def find_unreached(
     volumes = np.array([body.volume for body in tree.leaves]) * reached
     middles = np.array([tree.leaves[i].points.mean(axis=0) for i in rank(volumes)[:LOOKS]])
     recognisable = not around.solid(middles)
-    rooms, roofed = [], building.doors.floor.roof_share >= ROOFED
+    rooms: list[UnreachedRoom] = []
+    low: list[UnreachedRoom] = []
+    roofed = building.doors.floor.roof_share >= ROOFED
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
         points = spread_over(room.points, _CHOICE)
         # Outside, walls without a back face away; where rooms have no roof, a roof is furniture.
@@ -167,8 +172,9 @@ def find_unreached(
         # The inside of a shut door leaf is no room.
         thin = max(tree.leaves[leaf].width for leaf in leaves) <= THICK + structure.tolerance.plane
         if not (thin or (recognisable and around.solid(points))):
-            rooms.append(UnreachedRoom.from_bodies(leaves, room))
-    return Unreached(rooms, outside_room)
+            kind = rooms if place[group[room.leaf[0]]] >= LEAST_PLACE else low
+            kind.append(UnreachedRoom.from_bodies(leaves, room))
+    return Unreached(rooms, outside_room, tuple(low))
 
 
 def floor_of(
@@ -237,9 +243,10 @@ class DividedSpace:
     undecided: Counter[str] = field(default_factory=Counter)
 
 
-def is_open_to_sight(building: Building) -> bool:
-    """Whether lines of sight alone show what a division of the first root box would: visitors walk
-    on open ground between walls, much more than any void can hold; see `_is_elsewhere`.
+def closed_share(building: Building) -> float | None:
+    """The share of the floor that sees nothing of the outside, if lines of sight alone show what a
+    division of the first root box would: visitors walk on open ground between walls, several times
+    as much as any void can hold; see `_is_elsewhere`. None if they do not.
 
     Where no door leaf is in the way, a region of floor is open from end to end if some of it is.
     """
@@ -249,16 +256,17 @@ def is_open_to_sight(building: Building) -> bool:
     )
     points, row = sample_rows(corners, _SIGHTS)
     if not (len(points) and len(structure.corners)):
-        return False
+        return None
     points += [0.0, building.walker.middle, 0.0]
     around = structure.rays
     sees_out = around.see_out(points)
-    if not structure.door.any():
+    if not structure.door.any() and not structure.tolerance.step:
         count = np.bincount(region[row])
         share = sum_by_group(region[row], sees_out, len(count)) / np.maximum(count, 1)
         sees_out |= share[region[row]] >= _SEES_OUT
     walled = np.count_nonzero(sees_out & around.enclose(points, roofed=False))
-    return bool(walled > _GARDEN * np.count_nonzero(~sees_out))
+    shows = walled > _GARDEN * np.count_nonzero(~sees_out)
+    return float(1 - sees_out.mean()) if shows else None
 
 
 def divide_inside(building: Building, box: Floats, progress: Progress = silent) -> DividedSpace:

@@ -374,12 +374,16 @@ class Surroundings:
     def enclose(self, points: Floats, roofed: bool = True) -> Bools:
         """(n,) which of (n, 3) points are between walls and, if the building is ``roofed``, under a
         roof."""
-        result = np.zeros(len(points), dtype=np.bool_)
+        result: Bools = self.cover(points) if roofed else np.ones(len(points), dtype=np.bool_)
+        result[result] = self.walls_met(points[result]) >= INSIDE
+        return result
+
+    def walls_met(self, points: Floats) -> Floats:
+        """(n,) the share of level rays from (n, 3) points that meet a surface."""
+        result = np.zeros(len(points))
         for first in range(0, len(points), _AT_ONCE):
-            some = points[first : first + _AT_ONCE]
-            under = np.flatnonzero(self.cover(some)) if roofed else np.arange(len(some))
-            met = np.isfinite(self.free_about(some[under]))
-            result[first + under] = met.mean(axis=1) >= INSIDE
+            part = slice(first, first + _AT_ONCE)
+            result[part] = np.isfinite(self.free_about(points[part])).mean(axis=1)
         return result
 
     def _hits(self, points: Floats, along: Floats) -> Ints:

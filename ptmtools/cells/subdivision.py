@@ -43,7 +43,7 @@ from ptmtools.cells.planes import Polyhedron, bounds, boxes_meet
 from ptmtools.cells.portals import ends_of
 from ptmtools.cells.rooms import group_cells
 from ptmtools.cells.sight import seen_from_places
-from ptmtools.cells.space import DividedSpace, divide, divide_inside, is_open_to_sight
+from ptmtools.cells.space import DividedSpace, closed_share, divide, divide_inside
 from ptmtools.cells.structure import LOOKS, spread_over
 from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
@@ -92,8 +92,8 @@ def _divide_building(
     """The divided space of a building, the first root box if that is closed, else the second; and
     notes on it. ``large``: whether the division takes long."""
     wide, tight, notes = building.wide, building.tight, [*building_notes(building)]
-    if is_open_to_sight(building):
-        space, no_room = divide_inside(building, tight, progress), False
+    if (closed := closed_share(building)) is not None:
+        space, no_room = divide_inside(building, tight, progress), closed == 0
     else:
         clipped = executor.submit(divide_inside, building, tight, long=large)
         try:

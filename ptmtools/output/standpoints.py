@@ -222,8 +222,9 @@ def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArr
     # A roof, or a terrace, has a floor below.
     points[:, :, 1] = np.where(np.isfinite(floor), floor, 0.0)[:, None] - _SLAB * scale
     down = np.tile([0.0, -1.0, 0.0], (points.size // 3, 1))
-    floors = np.isfinite(around.first(points.reshape(-1, 3), down)[0]).reshape(len(leaves), -1)
-    roof = np.isin(kind, (SpaceKind.COURT, SpaceKind.OPEN)) & (floors.mean(axis=1) > 0.5)
+    floors = around.first(points.reshape(-1, 3), down)[1][:, 1] > 0  # not the ground's underside
+    roof = np.isin(kind, (SpaceKind.COURT, SpaceKind.OPEN))
+    roof &= floors.reshape(len(leaves), -1).mean(axis=1) > 0.5
     result[leaves] = 1 + 2 * kind + roof
     return result
 

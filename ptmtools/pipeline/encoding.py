@@ -474,8 +474,8 @@ def fallback_image(steps: Steps, header: PtmHeader, size: int) -> tuple[int, Pre
     """The level of the fallback image, and the preview that serves as one; None for a PNG.
 
     The level is the finest that does not exceed ``size`` (0: none does): one of the `.ptm`, or the
-    finest of all where that is an image. A WebP or AVIF serves only if the model has it: other
-    images are PNG, which all VRML browsers read.
+    finest of all where that is an image. A lossy preview of that level serves; a lossless one does
+    not: other images are PNG, which all VRML browsers read.
     """
     if steps.finest_is_image:
         finest = steps.previews[-1]

@@ -44,6 +44,8 @@ def test_rooms_with_pictures_have_the_cells_of_bare_ones(tmp_path: Path) -> None
         scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
         cells = subdivide(scene)
         shapes.append((cells.cell_count, cells.leaf_count, len(cells.portal_leaf)))
+        noted = [note for note in cells.notes if "such as pictures" in note]
+        assert len(noted) == (len(parts) > 1)
     assert shapes[0] == shapes[1]
     assert shapes[0][0] == 2
 
@@ -61,7 +63,18 @@ def test_what_stands_free_or_lines_a_room_divides(name: str, part: object, tmp_p
     assert more > walls_of({"house": HOUSE}, tmp_path)
 
 
-def test_names_have_the_last_word(tmp_path: Path) -> None:
+def test_a_cover_over_a_hole_divides(tmp_path: Path) -> None:
+    """Its sides are reveals between it and the wall; without it, the room would be open."""
+    cover = np.asarray(box((2, -0.3, 0.7), (5, -0.2, 2.3)))
+    parts = {
+        "house": carved(ROOMS[:1], [room(3, -0.2, 3.5, 0, 1, 1.5)]),
+        "cover": cover[(cover[:, :, 1] < -0.2).any(axis=1)],  # without a back
+    }
+    scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
+    assert subdivide(scene).closed
+
+
+def test_a_name_turns_the_rule_off(tmp_path: Path) -> None:
     parts = {"house": HOUSE, "canvas": PICTURES["canvas"]}
     scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
     plain, forced = (

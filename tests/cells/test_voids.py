@@ -10,7 +10,7 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cells.building import Building
-from ptmtools.cells.space import divide, is_open_to_sight
+from ptmtools.cells.space import closed_share, divide
 from ptmtools.cells.structure import Surroundings
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.orientation.space import to_world
@@ -80,7 +80,7 @@ def test_where_the_building_is(
 def test_sight_shows_what_a_division_would(parts: Parts, shows: bool, tmp_path: Path) -> None:
     scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
     building = Building.from_scene(scene, SubdivideOptions())
-    assert is_open_to_sight(building) == shows
+    assert (closed_share(building) is not None) == shows
     assert not (shows and divide(building, building.wide).closed)
 
 
@@ -101,3 +101,12 @@ def test_solids_that_overlap() -> None:
         assert around.solid_groups(np.array(points)[:, None, [1, 2, 0]]).tolist() == (
             [solid] * len(points)
         )
+
+
+@pytest.mark.parametrize(("high", "cells"), [(2.1, 2), (1.9, 1)])
+def test_a_low_room_beside_a_room_is_noted(high: float, cells: int, tmp_path: Path) -> None:
+    parts = {"rooms": carved([room(0, 0, 8, 6, 0, 3), room(8.3, 0, 15, 6, 0, high)])}
+    result = subdivide(ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES)))
+    assert result.cell_count == cells
+    low = [note for note in result.notes if "rooms lower than 2 m" in note]
+    assert len(low) == (cells == 1)
