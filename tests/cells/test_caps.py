@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from itertools import product
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
+import shapely
 
 from ptmtools.cells import Cells, subdivide
+from ptmtools.cells.planar import open_part, unite
+from ptmtools.cells.planes import Polyhedron, parallel_gap
+from ptmtools.cells.split_planes import _see_through, find_caps
+from ptmtools.cells.structure import Structure, WallPlane
+from ptmtools.scene import IngestOptions, ingest
+from ptmtools.tolerance import Tolerance
+from tests.cells.buildings import AXES, write
+from tests.cells.strangers import office
+from tests.scene.buildings import box
 
 
 def ramp(x0: float, x1: float) -> list[list[float]]:
@@ -74,3 +88,43 @@ def test_caps_that_seal_a_void_stay(quads, room_faces) -> None:
     assert x[0] != x[3]
     assert sealed.leaf_count == plain.leaf_count + 1
     assert np.isclose(plain.leaf_volumes().sum() - sealed.leaf_volumes().sum(), 1.5)
+
+
+def test_caps_of_a_body_are_those_of_its_parts(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Those that are kept from one split to the next are all that a search finds anew."""
+    inherited = []
+
+    def search(structure: Structure, body: Polyhedron, known: Any = ()) -> list[WallPlane]:
+        kept, fresh = find_caps(structure, body, known), find_caps(structure, body)
+        planes = [[cap.frame.plane for cap in caps] for caps in (kept, fresh)]
+        for plane, others in [*product(planes[0], planes[1:]), *product(planes[1], planes[:1])]:
+            gaps = [parallel_gap(plane, candidate, structure.tolerance) for candidate in others]
+            assert min(gaps) <= structure.tolerance.thin
+        inherited.append(bool(known) and bool(kept))
+        return kept
+
+    monkeypatch.setattr("ptmtools.cells.bsp.find_caps", search)
+    mullions = [box((0.6 * k, -6, 0), (0.6 * k + 0.06, -5.9, 3)) for k in range(35)]
+    rails = [box((0, -6, z), (21, -5.9, z + 0.06)) for z in (0, 0.8, 1.6, 2.4)]
+    ground = box((-9, -9, -0.3), (30, 15, -0.25))
+    parts = office(4) | {"facade": np.concatenate([*mullions, *rails, ground])}
+    subdivide(ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES)))
+    assert sum(inherited) > 10
+
+
+def test_few_points_see_through_openings_only() -> None:
+    tolerance = Tolerance.for_extent(10.0)
+    angle = np.linspace(0, 2 * np.pi, 7)[:-1]
+    outline = np.stack([2 * np.cos(angle), np.sin(angle)], axis=1)
+    generator = np.random.default_rng(5)
+    seen = 0
+    for count in range(1, 120):
+        triangles = generator.uniform(-2.5, 2.5, (count % 40, 3, 2))
+        if not _see_through(outline, triangles, tolerance.hairline):
+            continue
+        opening = open_part(shapely.polygons(outline), unite(triangles, tolerance.grid), tolerance)
+        assert not shapely.is_empty(opening)
+        seen += 1
+    assert 40 < seen < 119
