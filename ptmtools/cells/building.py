@@ -237,14 +237,6 @@ class Building:
         rooms, roofless = self.volumes.rooms, self.ceiling is not None
         return floors_with_ways(self.places, around, self.walker, tolerance, rooms, eyes, roofless)
 
-    def with_glass(self) -> Surroundings:
-        """The surroundings in which glass counts as a wall."""
-        structure = self.structure
-        if not len(self.doors.glass):
-            return structure.rays
-        walls = np.concatenate([structure.corners, self.doors.glass])
-        return Surroundings(walls, structure.tolerance)
-
 
 def _root_boxes(fabric: Fabric, structure: Structure) -> tuple[Polyhedron, Floats]:
     """`Building.wide` and `Building.tight`; the latter has a height in every direction: a mere

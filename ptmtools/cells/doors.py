@@ -306,13 +306,15 @@ class Doors:
         which = self.sides(tree, inside).any(axis=1) & self.sides(tree, outside).any(axis=1)
         return bool(which.any()) and bool((which & self.find_sheltered(structure)).any())
 
+    def with_glass(self, structure: Structure) -> Surroundings:
+        """The surroundings in which glass counts as a wall."""
+        if not len(self.glass):
+            return structure.rays
+        return Surroundings(np.concatenate([structure.corners, self.glass]), structure.tolerance)
+
     def find_sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have walls around and a roof above the ways on both sides."""
-        if len(self.glass):
-            corners = np.concatenate([structure.corners, self.glass])
-            around = Surroundings(corners, structure.tolerance)
-        else:
-            around = structure.rays
+        around = self.with_glass(structure)
         ways = (_ways(door, around) for door in self.leaves)
         roofed = self.floor.roof_share >= ROOFED
         enclosed = [all(around.enclose(points, roofed).all() for points in way) for way in ways]

@@ -1,5 +1,5 @@
 """Surfaces that hang on a wall or lie before it, such as pictures, screens, boards, radiators and
-rugs: they are drawn and occlude, but divide nothing, since nobody fits between them and the wall.
+rugs: they are drawn and occlude, but divide nothing, since no body fits behind them.
 
 A **front** is a polygon before another, larger wall that covers it from nearby and faces it, as the
 other side of the same wall does not. Linings and the leaves of cavity walls are as near to another

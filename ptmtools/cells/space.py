@@ -152,7 +152,7 @@ def find_unreached(
     sheltered = Standing.from_tree(tree, outside & ~outer, building)
     sheltered = sheltered.append(Standing.from_tree(tree, outside & outer, building))
     if len(sheltered.leaf):
-        sheltered = sheltered.only(building.with_glass().enclose(sheltered.points))
+        sheltered = sheltered.only(building.doors.with_glass(structure).enclose(sheltered.points))
     outside_room = None
     if sheltered.place.sum() >= LEAST_INSIDE:
         outside_room = UnreachedRoom.from_bodies(np.unique(sheltered.leaf), sheltered)
@@ -189,7 +189,8 @@ def floor_of(
     middle = floor.mean(axis=1) + [0.0, building.walker.middle, 0.0]
     kept, leaf = _locate_within(tree, leaves, middle)
     if outside:
-        kept &= ~np.isin(leaf, outside.leaves) | building.with_glass().enclose(middle)
+        around = building.doors.with_glass(building.structure)
+        kept &= ~np.isin(leaf, outside.leaves) | around.enclose(middle)
     return floor[kept]
 
 

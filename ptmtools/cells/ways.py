@@ -134,7 +134,7 @@ def _joins(places: Places, around: Surroundings, walker: Walker) -> Ints:
 
 def _ends_of_lines(plan: Geometry, pairs: Ints, count: int) -> tuple[Floats, Ints]:
     """(m, 2) points of the first of each of (p, 2) ``pairs`` of regions, and (m,) its row: the one
-    nearest to the second if ``count`` is 1, else about so many of its corners."""
+    nearest to the second if ``count`` is 1, else about that number of its corners."""
     start, to = plan[pairs].T
     if count == 1:
         return shapely.get_coordinates(shapely.shortest_line(start, to))[::2], np.arange(len(pairs))

@@ -1,7 +1,7 @@
 """Places to stand in the rooms of a scene, at eye height, away from the walls, with the best view
 (`views`): one in each of the rooms that the model names, then in spaces that a visitor would call
 rooms, then in courts, on open ground and in the rest (`room_kinds`); of each kind in those with the
-largest floors first. A room that the model names has one only.
+largest floors first, the lower of equal ones. A room that the model names has one only.
 
 `FloorFinder` finds the floor below a point: the nearest upward-facing surface. The squares of a
 grid in plan list the floor triangles whose boxes they touch, so that a query looks at the triangles
@@ -163,7 +163,7 @@ def places(
     numbers = cells.room_numbers.tolist()
     begin: list[Standpoint] = []
     best, least = 0, 0.0
-    for room in sorted(rooms, key=lambda room: (room.rank, -area(room.section), room.leaf)):
+    for room in sorted(rooms, key=_order):
         number, size = numbers[cells.leaf_cell[room.leaf]], area(room.section)
         as_good = not begin or (size >= least and room.rank == best)
         if len(by_room) >= count and not as_good:
@@ -179,6 +179,11 @@ def places(
     first = max(begin, key=lambda place: place.worth, default=None)
     ordered = sorted(by_room.values(), key=lambda place: place is not first)
     return ordered[:count]
+
+
+def _order(room: _Room) -> tuple[int, float, float, int]:
+    """Rooms are ordered by rank and size; of those as large, the lowest come first."""
+    return room.rank, -float(f"{area(room.section):.3g}"), room.floor, room.leaf
 
 
 def largest_leaves(cells: Cells, count: int, ranks: NDArray[np.int64] | None = None) -> list[int]:

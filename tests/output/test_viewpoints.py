@@ -115,15 +115,15 @@ def test_a_low_opening_is_a_long_way(room_row) -> None:
     assert walk(cells, 0, [], 1.6) == []
 
 
-def two_storeys(room_row) -> tuple[Scene, Cells]:
-    """Four rooms, every second lifted by a storey."""
+def two_storeys(room_row, even: bool = False) -> tuple[Scene, Cells]:
+    """Four rooms, every second lifted by a storey: those of ``even`` numbers, or the others."""
     scene, cells = room_row(4)
     corner = cells.leaf_point.copy()
-    corner[8:16, 1] += 4
-    corner[24:, 1] += 4
+    lift = [4 * (i % 2 != even) for i in range(4)]
+    corner[:, 1] += np.repeat(lift, 8)
     lifted = replace(cells, leaf_point=corner, root_box=np.array([[0, 0, -2], [16, 8, 2.0]]))
     floor = np.array([[0, 4, -2], [0, 4, 2], [4, 4, 2], [4, 4, -2]])
-    quads = [floor * [1, 0, 1] + [4 * i, 4 * (i % 2), 0] for i in range(4)]
+    quads = [floor * [1, 0, 1] + [4 * i, lift[i], 0] for i in range(4)]
     return replace(scene, points=np.concatenate([*quads, scene.points[16:] * 0])), lifted
 
 
@@ -138,6 +138,14 @@ def test_storeys_one_after_the_other(room_row) -> None:
     ]
     assert [v.cell for v in views] == [0, 2, 1, 3]
     assert [v.position[1] for v in views] == [1.6, 1.6, 5.6, 5.6]
+
+
+def test_a_walk_begins_on_the_lowest_of_equal_storeys(room_row) -> None:
+    """Whatever the order of the rooms."""
+    for even, cells in ((False, {0, 2}), (True, {1, 3})):
+        views, _ = place_viewpoints(*two_storeys(room_row, even), EmitOptions())
+        assert views[0].cell in cells
+        assert views[0].position[1] == 1.6
 
 
 @pytest.mark.parametrize(
