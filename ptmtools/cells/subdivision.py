@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,11 @@ def _divide_building(
     notes on it. ``large``: whether the division takes long."""
     wide, tight, notes = building.wide, building.tight, [*building_notes(building)]
     if (closed := closed_share(building)) is not None:
-        space, no_room = divide_inside(building, tight, progress), closed == 0
+        # A task that is not long runs in this thread, and frees the others for textures.
+        inside = executor.submit(
+            partial(divide_inside, progress=progress), building, tight, long=False
+        )
+        space, no_room = inside.result(), closed == 0
     else:
         clipped = executor.submit(divide_inside, building, tight, long=large)
         try:
