@@ -345,7 +345,7 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 14
+    recipe = 15
     changed = "white is balanced for bright light; coloured glass colours what passes"
     options = LightOptions
     heeds = (TEXTURES,)
