@@ -55,25 +55,71 @@ def distance(p: Floats, corner: Floats) -> float:
 
 
 @plain_kernel
-def crossings(points: Floats, corners: Floats, first: Ints, end: Ints, crossed: Ints) -> None:
-    """Adds to ``crossed`` (n,) the number of (m, 3, 3) triangles that the ray along +z from each of
-    the (n, 3) points crosses. Each triangle is tested against the points from its ``first`` to its
-    ``end`` (m,)."""
-    for t in range(len(corners)):
-        a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
-        low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
-        top = max(a[2], b[2], c[2])
-        for i in range(first[t], end[t]):
-            p = points[i]
-            if not (low <= p[1] <= high) or p[2] > top:
+def find_solids(
+    points: Floats,
+    turned: Floats,
+    rank: Ints,
+    boxes: Floats,
+    begin: Ints,
+    corners: Floats,
+    crossed: Ints,
+    owner: Ints,
+) -> None:
+    """Writes to ``owner`` (n,), where it is -1, the first solid that contains a point: most of the
+    three rays from it cross the solid an odd number of times.
+
+    Parameters
+    ----------
+    points: (n, 3).
+    turned: (3, n, 3) in frames in which a ray runs along +z, in the order of their x.
+    rank: (3, n) the places of the points in these orders.
+    boxes, begin: (B, 2, 3) of the solids, and (B + 1,) their triangles in ``corners``.
+    corners: (3, m, 3, 3) in the frames.
+    crossed: (3, n) overwritten.
+    """
+    for s in range(len(boxes)):
+        counted = False
+        for i in range(len(points)):
+            if owner[i] >= 0:
                 continue
-            # Of an edge and the edge the other way round exactly opposite.
-            u = (b[0] - p[0]) * (c[1] - p[1]) - (b[1] - p[1]) * (c[0] - p[0])
-            v = (c[0] - p[0]) * (a[1] - p[1]) - (c[1] - p[1]) * (a[0] - p[0])
-            w = (a[0] - p[0]) * (b[1] - p[1]) - (a[1] - p[1]) * (b[0] - p[0])
-            if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
-                above = u * (a[2] - p[2]) + v * (b[2] - p[2]) + w * (c[2] - p[2])
-                crossed[i] += above * (u + v + w) > 0
+            within = True
+            for axis in range(3):
+                within &= boxes[s, 0, axis] <= points[i, axis] <= boxes[s, 1, axis]
+            if not within:
+                continue
+            if not counted:
+                crossed[:] = 0
+                for ray in range(3):
+                    for t in range(begin[s], begin[s + 1]):
+                        add_crossings(turned[ray], corners[ray, t], crossed[ray])
+                counted = True
+            odd = 0
+            for ray in range(3):
+                odd += crossed[ray, rank[ray, i]] % 2
+            if odd > 1:
+                owner[i] = s
+
+
+@plain_kernel
+def add_crossings(points: Floats, corner: Floats, crossed: Ints) -> None:
+    """Adds 1 to ``crossed`` (n,) of each of the (n, 3) points, in the order of x, from which the
+    ray along +z crosses a (3, 3) triangle."""
+    a, b, c = corner[0], corner[1], corner[2]
+    low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+    left, right, top = min(a[0], b[0], c[0]), max(a[0], b[0], c[0]), max(a[2], b[2], c[2])
+    for i in range(np.searchsorted(points[:, 0], left), len(points)):
+        p = points[i]
+        if p[0] > right:
+            break
+        if not (low <= p[1] <= high) or p[2] > top:
+            continue
+        # Of an edge and the edge the other way round exactly opposite.
+        u = (b[0] - p[0]) * (c[1] - p[1]) - (b[1] - p[1]) * (c[0] - p[0])
+        v = (c[0] - p[0]) * (a[1] - p[1]) - (c[1] - p[1]) * (a[0] - p[0])
+        w = (a[0] - p[0]) * (b[1] - p[1]) - (a[1] - p[1]) * (b[0] - p[0])
+        if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
+            above = u * (a[2] - p[2]) + v * (b[2] - p[2]) + w * (c[2] - p[2])
+            crossed[i] += above * (u + v + w) > 0
 
 
 @plain_kernel

@@ -6,8 +6,9 @@
 and grouped by shared edges; a group is a *solid* if it is closed (every edge is used an even number
 of times, so that the parity of the crossings along a ray does not depend on the ray), unless
 
-- most of its area lies in cell boundaries: then it is structure, and the subdivision has already
-  decided what lies behind it (the mesh of a whole building is often one group), or
+- most of its area lies in cell boundaries, or most of the places in a cell are inside: then it is
+  structure, and the subdivision has already decided what lies behind it (the mesh of a whole
+  building is often one group), or
 - its faces consistently point inwards: a shell that is meant to be seen from within.
 
 Rejected: the parity of all crossings (each open or single sheet inverts it), and the generalised
@@ -23,12 +24,18 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints, areas
 from ptmtools.cells.model import Cells
+from ptmtools.cells.planes import bounds
 from ptmtools.cells.search import Nearby, connect
+from ptmtools.coverage.placement import CellVolume
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
 #: that an edge which one of them grazes is missed by the others; the majority counts.
 DIRECTIONS = np.array([[0.683, 0.577, 0.448], [-0.371, 0.819, -0.437], [0.291, -0.463, -0.837]])
+
+
+#: Places in each cell that tell whether it is within a solid.
+_TESTS = 16
 
 
 def _frames() -> Floats:
@@ -42,41 +49,9 @@ def _frames() -> Floats:
 FRAMES = _frames()
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A closed surface with an inside: its (n, 3, 3) corners and (2, 3) bounding box, metres."""
-
-    corners: Floats
-    box: Floats
-
-    def contains(self, points: Floats) -> Bools:
-        """(n,) whether each of the (n, 3) points is inside: odd crossings along most rays."""
-        first, second = self._odd(0, points), self._odd(1, points)
-        unsure = np.flatnonzero(first != second)
-        if len(unsure):
-            first[unsure] = self._odd(2, points[unsure])
-        return first
-
-    def _odd(self, ray: int, points: Floats) -> Bools:
-        """(n,) whether one of the rays from each of the (n, 3) points crosses an odd number."""
-        from ptmtools.coverage.kernels import crossings
-
-        turned = np.einsum("ij,kj->ik", points, FRAMES[ray])
-        order, first, end = by_x(turned, self._in_frames[ray], 0.0)
-        crossed = np.zeros(len(points), dtype=np.int64)
-        crossings(turned[order], self._in_frames[ray], first, end, crossed)
-        odd = np.empty(len(points), dtype=np.bool_)
-        odd[order] = crossed % 2 > 0
-        return odd
-
-    @cached_property
-    def _in_frames(self) -> list[Floats]:
-        """The corners in each of the frames."""
-        return [np.einsum("tij,kj->tik", self.corners, frame) for frame in FRAMES]
-
-
-def solids(scene: Scene, cells: Cells) -> list[Solid]:
-    """The closed surfaces of a scene that have an inside, in the order of their triangles."""
+def solids(scene: Scene, cells: Cells) -> list[Floats]:
+    """The (n, 3, 3) corners of each closed surface of a scene that has an inside, in the order of
+    their triangles."""
     if len(scene.triangles) == 0:
         return []
     _, weld = np.unique(scene.points + 0.0, axis=0, return_inverse=True)  # -0 is 0
@@ -88,18 +63,18 @@ def solids(scene: Scene, cells: Cells) -> list[Solid]:
     count = len(corner)
     area = np.bincount(group, areas(all_corners), count)
     in_boundary = np.bincount(group, boundary_area(scene, cells), count)
-    bounds = closed & (2 * in_boundary <= area)
+    chosen = closed & (2 * in_boundary <= area)
     order = np.argsort(group, kind="stable")
-    order = order[bounds[group[order]]]
+    order = order[chosen[group[order]]]
     result = []
     for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
         if not len(members):
             continue
         corners = all_corners[members]
-        box = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
-        inwards = balanced[group[members[0]]] and signed_volume(corners - box.mean(axis=0)) < 0
+        middle = np.mean(bounds(corners), axis=0)
+        inwards = balanced[group[members[0]]] and signed_volume(corners - middle) < 0
         if not inwards:
-            result.append(Solid(corners, box))
+            result.append(corners)
     return result
 
 
@@ -151,29 +126,52 @@ class SampleObstacles:
 
     corners: Floats  # (T, 3, 3) all surfaces, metres
     nearby: Nearby
-    solids: tuple[Solid, ...]  # the closed ones with an inside
-    boxes: Floats  # (B, 2, 3) their bounding boxes
+    solids: tuple[Floats, ...]  # (n, 3, 3) corners of each closed one with an inside
 
     @staticmethod
     def from_scene(scene: Scene, cells: Cells) -> SampleObstacles:
         """The obstacles of a subdivided scene."""
         corners = scene.corners
-        bodies = tuple(solids(scene, cells))
-        boxes = np.array([solid.box for solid in bodies]).reshape(-1, 2, 3)
-        return SampleObstacles(corners, Nearby(corners, 0.0), bodies, boxes)
+        obstacles = SampleObstacles(corners, Nearby(corners, 0.0), tuple(solids(scene, cells)))
+        volumes = CellVolume.of_cells(cells)
+        points = [volume.sobol(0, _TESTS, 0)[:, :3] for volume in volumes]
+        cell = np.repeat(np.arange(len(points)), [len(some) for some in points])
+        tests = np.concatenate([np.zeros((0, 3)), *points])
+        while True:
+            owner = obstacles.solid_of(tests)
+            pair, count = np.unique(
+                np.stack([owner, cell], axis=1)[owner >= 0], axis=0, return_counts=True
+            )
+            rooms = set(pair[2 * count > np.bincount(cell)[pair[:, 1]], 0].tolist())
+            if not rooms:
+                return obstacles
+            rest = tuple(body for n, body in enumerate(obstacles.solids) if n not in rooms)
+            obstacles = SampleObstacles(corners, obstacles.nearby, rest)
 
     def in_solid(self, points: Floats) -> Bools:
         """(n,) whether each of the (n, 3) points is inside a solid."""
-        inside = np.zeros(len(points), dtype=np.bool_)
-        if len(points) == 0:
-            return inside
-        low, high = points.min(axis=0), points.max(axis=0)
-        near = np.all((self.boxes[:, 0] <= high) & (low <= self.boxes[:, 1]), axis=1)
-        for solid in np.flatnonzero(near):
-            lower, upper = self.boxes[solid]
-            boxed = ~inside & np.all((lower <= points) & (points <= upper), axis=1)
-            inside[boxed] = self.solids[solid].contains(points[boxed])
-        return inside
+        return self.solid_of(points) >= 0
+
+    def solid_of(self, points: Floats) -> Ints:
+        """(n,) the first of the solids that contains each of the (n, 3) points, -1 for none."""
+        from ptmtools.coverage.kernels import find_solids
+
+        owner = np.full(len(points), -1)
+        if self.solids:
+            turned = np.einsum("ij,fkj->fik", points, FRAMES)
+            order = np.argsort(turned[..., 0], axis=1, kind="stable")
+            turned = np.take_along_axis(turned, order[..., None], axis=1)
+            crossed, rank = np.zeros_like(order), np.argsort(order, axis=1)
+            find_solids(points, turned, rank, *self._bodies, crossed, owner)
+        return owner
+
+    @cached_property
+    def _bodies(self) -> tuple[Floats, Ints, Floats]:
+        """The boxes of the solids, their first triangles and all corners, as `find_solids` takes
+        them."""
+        boxes = np.array([bounds(corners) for corners in self.solids])
+        begin = np.cumsum([0, *map(len, self.solids)])
+        return boxes, begin, np.einsum("tij,fkj->ftik", np.concatenate(self.solids), FRAMES)
 
     def clearance(self, points: Floats, enough: float) -> Floats:
         """(n,) distance in metres from each of the (n, 3) points to the nearest surface, at most

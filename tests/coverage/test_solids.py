@@ -75,6 +75,8 @@ def test_structure_is_the_subdivisions_business(room_row, furnish):
     # The same shell, none of it in a boundary, is taken for a solid block.
     loose = replace(cells, triangle_cell=np.zeros_like(cells.triangle_cell))
     assert len(solids(turned, loose)) == 1
+    # Visitors stand within it.
+    assert SampleObstacles.from_scene(turned, loose).solids == ()
 
 
 def test_open_and_thin_things_have_no_inside(room_row, furnish):

@@ -22,7 +22,8 @@ class AchStage(Stage["Ach"]):
 
     name = "ach"
     about = "Measure how much of the view each visible cell covers."
-    recipe = 3
+    recipe = 4
+    changed = "a building of one closed surface no longer counts as a solid"
     options = AchOptions
     reads = (SCENE, CELLS, PVS)
     artifact = Lazy("ptmtools.coverage.model:Ach")
