@@ -125,7 +125,8 @@ def chromium(require: Callable[[str, str], None]) -> Iterator[Any]:
     if (program := web.chromium()) is None:
         require("Chromium", "apt install chromium")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        flags = ["--no-sandbox", web.WITHOUT_POPUPS]
+        browser = playwright.chromium.launch(executable_path=program, args=flags)
         yield browser
         browser.close()
 

@@ -38,8 +38,30 @@ addEventListener("error", (event) => post("/say", `error: ${event.message}`));
 addEventListener("unhandledrejection", (event) => post("/say", `error: ${event.reason}`));
 </script>
 """
+#: Switches off what playwright does, whose list this replaces, and the popups of the address bar:
+#: each window of a headless browser starts two processes for them, in a second of processor time.
+WITHOUT_POPUPS = "--disable-features=" + ",".join(
+    (
+        "AimEnabled",
+        "AvoidCorsURLLoaderRestartOnRedirect",
+        "AvoidUnnecessaryBeforeUnloadCheckSync",
+        "DestroyProfileOnBrowserClose",
+        "HttpsFirstBalancedModeAutoEnable",
+        "HttpsUpgrades",
+        "LensOverlay",
+        "MediaRouter",
+        "NetworkTimeServiceQuerying",
+        "OptimizationHints",
+        "PaintHolding",
+        "PreconnectToSearch",
+        "ThirdPartyStoragePartitioning",
+        "WebUIOmniboxAimPopup",
+        "WebUIOmniboxPopup",
+    )
+)
 FLAGS = (
     "--headless",
+    WITHOUT_POPUPS,
     "--no-sandbox",
     "--use-gl=angle",
     "--use-angle=swiftshader",
