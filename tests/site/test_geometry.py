@@ -20,14 +20,13 @@ UNREAD += ("baseColorTexture", "occlusionTexture")
 
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[bytes]]:
-    """Of each form all GLBs of a small museum."""
+    """Of each form all GLBs of a small museum, emitted from the same database."""
     folder = tmp_path_factory.mktemp("lean")
-    model = make_museum(folder / "model", rooms=2)
+    model, db = make_museum(folder / "model", rooms=2), folder / "museum.db"
+    words = ["-q", "build-scene", str(model), "-o", str(db), "-j", "1", "--light-samples", "4"]
     result = {}
     for form, options in {"compressed": [], "plain": ["--plain-gltf"]}.items():
-        db = folder / f"{form}.db"
-        words = ["-o", str(db), "-j", "1", "--light-samples", "4", *options]
-        assert main(["-q", "build-scene", str(model), *words]) == 0
+        assert main([*words, *options]) == 0
         result[form] = [path.read_bytes() for path in sorted((db / "www/gltf").iterdir())]
     return result
 
