@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,14 +31,20 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def site(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Site:
-    return site_of(build(model, tmp_path_factory.mktemp("built") / "db"), PLAIN)
+def database(model: Path) -> Path:
+    return build(model, model.with_name("db"))
 
 
 @pytest.fixture(scope="module")
-def plain(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Site:
-    database = build(model, tmp_path_factory.mktemp("plain") / "db", "--lods", "none")
+def site(database: Path) -> Site:
     return site_of(database, PLAIN)
+
+
+@pytest.fixture(scope="module")
+def plain(model: Path, database: Path) -> Site:
+    """Of a copy that is emitted again."""
+    copy = shutil.copytree(database, database.with_name("plain"))
+    return site_of(build(model, copy, "--lods", "none"), PLAIN)
 
 
 class Gate:
