@@ -214,11 +214,15 @@ def new_page(
 
 
 def visiting_in(
-    page: Any, entries: Mapping[str, SiteEntry], *, query: str = ""
+    page: Any,
+    entries: Mapping[str, SiteEntry],
+    *,
+    query: str = "",
+    throttle: Throttle | None = None,
 ) -> AbstractContextManager[Visitor]:
     """Leads a page to a site, and away from it in the end: a page takes longer to start than a
     small site to come. Each site has another origin, so that nothing of the one before is left."""
-    return _visiting(page, entries, query, None, lambda: page.goto("about:blank"))
+    return _visiting(page, entries, query, throttle, lambda: page.goto("about:blank"))
 
 
 @contextmanager

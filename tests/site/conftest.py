@@ -42,34 +42,26 @@ def _compressed_once() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def visit(chromium: Any) -> Visiting:
-    """``with visit(site, query="?memory=4") as visitor:`` see `browser.visiting`."""
-
-    def of(site: Site, **options: Any) -> AbstractContextManager[Visitor]:
-        return visiting(chromium, site.entries, **options)
-
-    return of
-
-
 @pytest.fixture(scope="session")
 def window(chromium: Any) -> Iterator[Any]:
-    """The page of `revisit`."""
+    """The page of visits that prepare nothing."""
     page = new_page(chromium)
     yield page
     page.context.close()
 
 
 @pytest.fixture
-def revisit(window: Any) -> Visiting:
-    """As `visit`, by a page that others have been to, which starts faster; of its options, only
-    ``query`` and the sizes."""
+def visit(chromium: Any, window: Any) -> Visiting:
+    """``with visit(site, query="?memory=4") as visitor:`` see `browser.visiting`. Where nothing of
+    the page or its context is prepared, it is one that others have been to, which starts faster."""
 
     def of(
-        site: Site, query: str = "", width: int = 640, height: int = 480
+        site: Site, *, width: int = 640, height: int = 480, **options: Any
     ) -> AbstractContextManager[Visitor]:
-        window.set_viewport_size({"width": width, "height": height})
-        return visiting_in(window, site.entries, query=query)
+        if options.keys() <= {"query", "throttle"} and window.url == "about:blank":
+            window.set_viewport_size({"width": width, "height": height})
+            return visiting_in(window, site.entries, **options)
+        return visiting(chromium, site.entries, width=width, height=height, **options)
 
     return of
 

@@ -188,10 +188,10 @@ def check_strips(visitor: Visitor, site: Site, tone: str, size: tuple[int, int])
 
 
 @pytest.mark.parametrize("tone", ["neutral", "agx", "plain"])
-def test_each_pixel_follows_the_formula(revisit: Visiting, plain: Site, tone: str) -> None:
+def test_each_pixel_follows_the_formula(visit: Visiting, plain: Site, tone: str) -> None:
     """Of a lightmap, of light at vertices, of an unlit surface, under a normal map, and around."""
     site = lit_site(plain, lambda index: index["light"].update(tone=tone))
-    with revisit(site, width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, width=WIDTH, height=HEIGHT) as visitor:
         check_strips(visitor, site, tone, (WIDTH, HEIGHT))
 
 
@@ -232,11 +232,11 @@ SHRINK = """
 """
 
 
-def test_reflections_follow_the_formula(revisit: Visiting, plain: Site) -> None:
+def test_reflections_follow_the_formula(visit: Visiting, plain: Site) -> None:
     """Without the finest level of the probe, coarser ones mix its parts: its mean counts."""
     site, size = mirror_site(plain), (WIDTH, HEIGHT)
     probe = len(site.index["textures"]) - 2
-    with revisit(site, width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, width=WIDTH, height=HEIGHT) as visitor:
         stand(visitor, EYES[0])
         levels = visitor.complete()["held"][probe]
         assert unlike_mirrors(visitor, site, size) == {}
@@ -258,13 +258,13 @@ def test_without_a_probe(visit: Visiting, plain: Site) -> None:
         assert unlike_mirrors(visitor, site, (WIDTH, HEIGHT), arrives=False) == {}
 
 
-def test_low_quality_reflects_nothing(revisit: Visiting, plain: Site) -> None:
+def test_low_quality_reflects_nothing(visit: Visiting, plain: Site) -> None:
     """And needs no probe: surfaces are as if no material had one."""
     site, bare = mirror_site(plain), mirror_site(plain, probe=False)
     _, parts = mirrors_of(site.index["viewpoints"][0]["fieldOfView"], EYES[0], (WIDTH, HEIGHT))
     pictures = []
     for each, query in ((site, "?quality=low"), (bare, "")):
-        with revisit(each, query=query, width=WIDTH, height=HEIGHT) as visitor:
+        with visit(each, query=query, width=WIDTH, height=HEIGHT) as visitor:
             stand(visitor, EYES[0])
             picture = settled(visitor)
             pictures.append({name: picture[part] for name, part in parts.items()})
@@ -325,13 +325,13 @@ EXPOSURES = """
 """
 
 
-def test_exposure_eases(revisit: Visiting, plain: Site) -> None:
+def test_exposure_eases(visit: Visiting, plain: Site) -> None:
     """Within a second; at once after a jump, or if nothing shall move; outside of all cells it
     stays."""
     less, more = EXPOSURE
     steps = [(1, 3.0, 0.5), (0, 0.0, 1.0), (1, 0.2, 1.1), (1, 0.3, 1.3), (1, 0.4, 2.2)]
     steps += [(-1, 0.5, 3.0), (0, -2.0, 3.1)]
-    with revisit(lit_site(plain), width=64, height=48) as visitor:
+    with visit(lit_site(plain), width=64, height=48) as visitor:
         visitor.complete()
         eased, sudden = (visitor.page.evaluate(EXPOSURES, [f, steps]) for f in (True, False))
     assert sudden == [more, less, more, more, more, more, less]
@@ -375,11 +375,11 @@ def test_hostile_light(hasty: Any, plain: Site, fault: str) -> None:
         assert set(visitor.page.evaluate(CODES)) == {"PTM-V105"}
 
 
-def test_without_its_script(revisit: Visiting, plain: Site) -> None:
+def test_without_its_script(visit: Visiting, plain: Site) -> None:
     """The walk goes on, unlit."""
     entries = lit_site(plain).entries
     entries = {name: e for name, e in entries.items() if not name.endswith("/light.js")}
-    with revisit(Site(entries, {}), width=160, height=120) as visitor:
+    with visit(Site(entries, {}), width=160, height=120) as visitor:
         visitor.page.wait_for_selector("#notices p")
         stand(visitor, EYES[0])
         visitor.complete()

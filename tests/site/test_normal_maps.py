@@ -62,10 +62,10 @@ def inside(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", EYES)
 def test_they_are_drawn_as_by_render(
-    revisit: Visiting, site: Site, database: Path, name: str
+    visit: Visiting, site: Site, database: Path, name: str
 ) -> None:
     served = read_served(database)
-    with revisit(site, query=address(name), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(name), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         assert visitor.page.evaluate(HELD)[0] > 3
         picture = visitor.picture().astype(float)
@@ -73,7 +73,7 @@ def test_they_are_drawn_as_by_render(
     assert 10 * np.log10(255**2 / inside(picture, expected(served, name)).mean()) >= 40
 
 
-def test_they_come_after_the_first_picture(revisit: Visiting, site: Site) -> None:
+def test_they_come_after_the_first_picture(visit: Visiting, site: Site) -> None:
     numbers = [n for n, row in enumerate(site.index["textures"]) if row.get("normals")]
     assert len(numbers) == 2
     files = {site.index["textures"][n]["file"].rpartition("/")[2] for n in numbers}
@@ -87,7 +87,7 @@ def test_they_come_after_the_first_picture(revisit: Visiting, site: Site) -> Non
         for row in site.index["textures"]
         if row["file"].startswith("room_a")
     )
-    with revisit(site, query=address("wall"), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address("wall"), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         paths = [v.path.rpartition("/")[2] for v in visitor.visits]
         own = [at for at, path in enumerate(paths) if path in files]
@@ -95,7 +95,7 @@ def test_they_come_after_the_first_picture(revisit: Visiting, site: Site) -> Non
         assert min(own) > paths.index(shown)
 
 
-def test_the_simulator_wants_the_same_levels(revisit: Visiting, site: Site, database: Path) -> None:
+def test_the_simulator_wants_the_same_levels(visit: Visiting, site: Site, database: Path) -> None:
     """Of a map beside the textures of walls and floor, as much as its own pixels want."""
     served = read_served(database)
     name, K = "floor", "window.ptm.walk.client.catalogue.K"
@@ -103,7 +103,7 @@ def test_the_simulator_wants_the_same_levels(revisit: Visiting, site: Site, data
         n for n, row in enumerate(served.index["textures"]) if row["file"] == "textures/waves.ptm"
     )
     row = f"[...window.ptm.walk.needs.present].slice({number} * {K}, {number + 1} * {K})"
-    with revisit(site, query=address(name), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(name), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         actual = np.array(visitor.page.evaluate(row))[1:]
     eye, yaw = EYES[name]

@@ -47,7 +47,7 @@ def address(statue: int) -> str:
 
 @pytest.mark.parametrize("statue", EYES)
 def test_they_are_drawn_as_by_render(
-    revisit: Visiting, site: Site, database: Path, statue: int
+    visit: Visiting, site: Site, database: Path, statue: int
 ) -> None:
     served = read_served(database)
     eye, yaw = EYES[statue]
@@ -72,7 +72,7 @@ def test_they_are_drawn_as_by_render(
         for dx in range(-3, 4):
             inside = inside & np.roll(mask, (dy, dx), (0, 1))
     assert inside.sum() > 0.1 * mask.size
-    with revisit(site, query=address(statue), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(statue), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         assert visitor.page.evaluate(LEVELS)[statue] >= 6
         picture = visitor.picture()
@@ -89,8 +89,8 @@ WANTED = """(() => {
 })()"""
 
 
-def test_the_screen_decides_how_many_levels_are_wanted(revisit: Visiting, site: Site) -> None:
-    with revisit(site, query=address(0), width=20, height=15) as visitor:
+def test_the_screen_decides_how_many_levels_are_wanted(visit: Visiting, site: Site) -> None:
+    with visit(site, query=address(0), width=20, height=15) as visitor:
         visitor.until("s.complete")
         few = visitor.page.evaluate(WANTED)
         assert few >= 4
@@ -99,9 +99,9 @@ def test_the_screen_decides_how_many_levels_are_wanted(revisit: Visiting, site: 
         visitor.until("s.complete")
 
 
-def test_a_context_that_is_lost(revisit: Visiting, site: Site) -> None:
+def test_a_context_that_is_lost(visit: Visiting, site: Site) -> None:
     statue = slice(80, 160), slice(120, 200)
-    with revisit(site, query=address(1), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(1), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         before = visitor.picture()[statue]
         assert np.ptp(before) > 10  # lit
@@ -114,7 +114,7 @@ def test_a_context_that_is_lost(revisit: Visiting, site: Site) -> None:
 
 @pytest.mark.parametrize("number", [0, 99])
 def test_an_object_with_another_texture_for_a_normal_map(
-    revisit: Visiting, site: Site, number: int
+    visit: Visiting, site: Site, number: int
 ) -> None:
     """0 is the texture of the floor, 99 does not exist."""
     entries: dict[str, SiteEntry] = dict(site.entries)
@@ -127,19 +127,19 @@ def test_an_object_with_another_texture_for_a_normal_map(
                 material["extras"]["normal"] = number
         entries[name] = SiteEntry(name, pack(document, binary), entry.media)
     changed = Site(entries, site.index)
-    with revisit(changed, query=address(0), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(changed, query=address(0), width=WIDTH, height=HEIGHT) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
         visitor.until("s.complete")
         assert visitor.page.evaluate("window.ptm.errors[0].code") == "PTM-V105"
         assert not visitor.page.is_visible("#error")
 
 
-def test_a_normal_map_that_is_missing(revisit: Visiting, site: Site) -> None:
+def test_a_normal_map_that_is_missing(visit: Visiting, site: Site) -> None:
     row = next(row for row in site.index["textures"] if row.get("relief") == "statue_01")
     gone = {row["file"], *(preview["file"] for preview in row.get("previews", ()))}
     entries = {n: e for n, e in site.entries.items() if n.rpartition("/")[2] not in gone}
     assert len(entries) == len(site.entries) - len(gone)
-    with revisit(Site(entries, site.index), query=address(0)) as visitor:
+    with visit(Site(entries, site.index), query=address(0)) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
         assert visitor.page.evaluate("window.ptm.errors[0].code") == "PTM-V103"
         visitor.until("s.complete")
@@ -147,9 +147,9 @@ def test_a_normal_map_that_is_missing(revisit: Visiting, site: Site) -> None:
         assert visitor.page.evaluate(LEVELS)[0] == 0
 
 
-def test_other_sites_do_not_load_the_script(revisit: Visiting, site: Site, museum: Site) -> None:
+def test_other_sites_do_not_load_the_script(visit: Visiting, site: Site, museum: Site) -> None:
     def loads(of: Site) -> bool:
-        with revisit(of, width=64, height=48) as visitor:
+        with visit(of, width=64, height=48) as visitor:
             visitor.until("s.complete")
             return any(v.path.endswith("reliefs.js") for v in visitor.visits)
 

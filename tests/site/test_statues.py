@@ -50,7 +50,7 @@ def address(eye: np.ndarray, yaw: float) -> str:
     return "#" + ",".join(f"{x:.4f}" for x in (*eye, yaw))
 
 
-def test_they_are_drawn_as_by_render(revisit: Visiting, site: Site, database: Path) -> None:
+def test_they_are_drawn_as_by_render(visit: Visiting, site: Site, database: Path) -> None:
     served = read_served(database)
     eye, yaw = pose(database, 1, 0.9)
     angle = float(np.degrees(served.index["viewpoints"][0]["fieldOfView"]))
@@ -67,7 +67,7 @@ def test_they_are_drawn_as_by_render(revisit: Visiting, site: Site, database: Pa
         for dx in range(-3, 4):
             inside = inside & np.roll(mask, (dy, dx), (0, 1))
     assert inside.sum() > 0.1 * mask.size
-    with revisit(site, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         assert visitor.page.evaluate(LEVELS)[1] >= 6
         picture = visitor.picture()
@@ -76,10 +76,10 @@ def test_they_are_drawn_as_by_render(revisit: Visiting, site: Site, database: Pa
     assert 10 * np.log10(255**2 / error) >= 38
 
 
-def test_levels_follow_the_distance(revisit: Visiting, site: Site, database: Path) -> None:
+def test_levels_follow_the_distance(visit: Visiting, site: Site, database: Path) -> None:
     far, yaw = pose(database, 0, 2.0)
     (file,) = (e.name for e in site.entries.values() if "statue_01" in e.name)
-    with revisit(site, query=address(far, yaw), width=80, height=60) as visitor:
+    with visit(site, query=address(far, yaw), width=80, height=60) as visitor:
         visitor.until("s.complete")
         asked = [v for v in visitor.visits if v.path.endswith(file)]
         assert len(asked) == 1  # seven levels at once
@@ -90,10 +90,10 @@ def test_levels_follow_the_distance(revisit: Visiting, site: Site, database: Pat
         assert len([v for v in visitor.visits if v.path.endswith(file)]) > 1
 
 
-def test_a_context_that_is_lost(revisit: Visiting, site: Site, database: Path) -> None:
+def test_a_context_that_is_lost(visit: Visiting, site: Site, database: Path) -> None:
     eye, yaw = pose(database, 1, 0.9)
     statue = slice(80, 160), slice(120, 200)
-    with revisit(site, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         before = visitor.picture()[statue]
         assert np.ptp(before) > 10  # lit
@@ -133,7 +133,7 @@ def test_a_damaged_octree_leaves_the_walk(
 
 
 def test_a_level_that_fails_later_leaves_those_before(
-    revisit: Visiting, site: Site, database: Path
+    visit: Visiting, site: Site, database: Path
 ) -> None:
     eye, yaw = pose(database, 0, 0.9)
     (name,) = (n for n in site.entries if "statue_01" in n)
@@ -142,13 +142,13 @@ def test_a_level_that_fails_later_leaves_those_before(
     end = row["ends"][6]
     spoilt = data[:end] + bytes(len(data) - end)
     entries = {**site.entries, name: SiteEntry(name, spoilt, site.entries[name].media)}
-    with revisit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
+    with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
         visitor.page.wait_for_function("window.ptm?.errors.length > 0", timeout=90_000)
         assert visitor.page.evaluate(LEVELS)[0] == 7
         visitor.until("s.complete")
 
 
-def test_a_wrong_row_leaves_the_walk(revisit: Visiting, site: Site, database: Path) -> None:
+def test_a_wrong_row_leaves_the_walk(visit: Visiting, site: Site, database: Path) -> None:
     eye, yaw = pose(database, 0, 0.9)
     (name,) = (n for n in site.entries if "/index-" in n)
     document = json.loads(site.entries[name].read())
@@ -157,12 +157,12 @@ def test_a_wrong_row_leaves_the_walk(revisit: Visiting, site: Site, database: Pa
         **site.entries,
         name: SiteEntry(name, json.dumps(document).encode(), "application/json"),
     }
-    with revisit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
+    with visit(Site(entries, site.index), query=address(eye, yaw)) as visitor:
         visitor.until("s.complete")
         assert visitor.page.evaluate("window.ptm.errors[0].code") == "PTM-V105"
 
 
-def test_it_begins_without_textures(revisit: Visiting, tmp_path: Path) -> None:
+def test_it_begins_without_textures(visit: Visiting, tmp_path: Path) -> None:
     model = write_rooms(tmp_path / "model", 4)
     for file in model.parent.glob("*.mtl"):
         lines = file.read_text().splitlines()
@@ -170,7 +170,7 @@ def test_it_begins_without_textures(revisit: Visiting, tmp_path: Path) -> None:
     build(model, tmp_path / "db", *OCTREES)
     eye, yaw = pose(tmp_path / "db", 1, 0.9)
     plain = site_of(tmp_path / "db", PLAIN)
-    with revisit(plain, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(plain, query=address(eye, yaw), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete", 60)
         assert visitor.page.evaluate(LEVELS)[1] > 0
         visitor.complete()
@@ -178,11 +178,11 @@ def test_it_begins_without_textures(revisit: Visiting, tmp_path: Path) -> None:
         assert visitor.messages == []
 
 
-def test_freezing_and_comparing(revisit: Visiting, site: Site, database: Path) -> None:
+def test_freezing_and_comparing(visit: Visiting, site: Site, database: Path) -> None:
     near, yaw = pose(database, 1, 0.9)
     far, turned = pose(database, 0, 1.6)
     (name,) = (n for n in site.entries if "statue_02" in n)
-    with revisit(site, query=address(far, turned), width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site, query=address(far, turned), width=WIDTH, height=HEIGHT) as visitor:
         visitor.until("s.complete")
         visitor.page.evaluate("window.ptm.freeze(true)")
         go = f"window.ptm.goTo({{eye: {near.tolist()}, yaw: {np.radians(yaw)}, pitch: 0}})"
@@ -200,10 +200,10 @@ def test_freezing_and_comparing(revisit: Visiting, site: Site, database: Path) -
 
 
 def test_other_sites_do_not_load_the_script(
-    revisit: Visiting, site: Site, museum: Site, database: Path
+    visit: Visiting, site: Site, museum: Site, database: Path
 ) -> None:
     def loads(of: Site) -> bool:
-        with revisit(of, width=64, height=48) as visitor:
+        with visit(of, width=64, height=48) as visitor:
             visitor.until("s.complete")
             return any(v.path.endswith("statues.js") for v in visitor.visits)
 
@@ -274,7 +274,7 @@ def test_all_levels_come_by_worth(visit: Visiting, site: Site, database: Path) -
     assert asked[0] == f"bytes=2-{row['ends'][6] - 1}"
 
 
-def test_glass_is_drawn_beside_them(revisit: Visiting, tmp_path: Path) -> None:
+def test_glass_is_drawn_beside_them(visit: Visiting, tmp_path: Path) -> None:
     """In a building with lightmaps; glass has none."""
     pytest.importorskip("xatlas", reason="pip install 'ptmtools[light]'")
     model = write_rooms(tmp_path / "model", 3)
@@ -291,7 +291,7 @@ def test_glass_is_drawn_beside_them(revisit: Visiting, tmp_path: Path) -> None:
     expected = draw_view(served, view)[60, 250].astype(int)
     assert expected[0] > 2 * expected[1]
     query = address(eye, yaw)
-    with revisit(site_of(database, PLAIN), query=query, width=WIDTH, height=HEIGHT) as visitor:
+    with visit(site_of(database, PLAIN), query=query, width=WIDTH, height=HEIGHT) as visitor:
         visitor.until(f"({LEVELS})[0] > 0")
         visitor.complete()
         assert np.abs(visitor.picture()[60, 250] - expected).max() <= 3
