@@ -19,7 +19,7 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.site.content import Site, SiteOptions, site_of
 from ptmtools.tour.starting import first_tour
-from tests.site.browser import Visitor, visiting
+from tests.site.browser import Visitor, new_page, visiting, visiting_in
 
 HOSTILE = "<img src=x onerror=window.broken=1> [x](javascript:window.broken=1) **bold**"
 CAPTIONS = "WEBVTT\n\n00:00.000 --> 00:09.000\n<v Guide>Look <b>left</b> &amp; up\n"
@@ -73,9 +73,16 @@ def toured(museum_db: Path, tour_file: Path) -> Site:
     return site_of(museum_db, SiteOptions(pictures=False, opening=False, tour=str(tour_file)))
 
 
+@pytest.fixture(scope="module")
+def page(chromium: Any) -> Iterator[Any]:
+    page = new_page(chromium, 960, locale="en-GB")
+    yield page
+    page.context.close()
+
+
 @pytest.fixture
-def visitor(chromium: Any, toured: Site) -> Iterator[Visitor]:
-    with visiting(chromium, toured.entries, width=960, locale="en-GB") as visitor:
+def visitor(page: Any, toured: Site) -> Iterator[Visitor]:
+    with visiting_in(page, toured.entries) as visitor:
         visitor.until("window.ptm.tour")
         visitor.complete()
         yield visitor
