@@ -49,7 +49,7 @@ _POSITION, _COORDINATES, _COLOR = 12, 8, 8
 _PLACED, _TEXTURED, _LIT, _BOTH = 3, 5, 7, 9
 #: Exponents of the steps of normal, tangent and sign, see `apo.normal_map`; bytes of a normal.
 _FRAME, _NORMAL = np.array([-9] * 6 + [0]), 12
-_WHOLE_BYTES = 0
+WHOLE_BYTES = 0
 _NORMALIZED = {"normalized": True}
 
 
@@ -159,7 +159,7 @@ class CompressedBuffer:
         width = _BOTH if normal else _LIT if lit else _TEXTURED if textured else _PLACED
         element = exponential(step[:, :width], exponent[:, :width])
         form = {"mode": "ATTRIBUTES", "filter": "EXPONENTIAL"}
-        vertices = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
+        vertices = self._view(encode_attributes(element, WHOLE_BYTES), element, form)
         count = len(step)
         position = step[:, :3] * 2.0**self._exponent
         ends = {"min": position.min(axis=0), "max": position.max(axis=0)}
@@ -175,7 +175,7 @@ class CompressedBuffer:
         if framed:
             frame = np.concatenate([p.frame for p in parts if p.frame is not None])
             element = exponential(frame, np.broadcast_to(_FRAME, frame.shape))
-            view = self._view(encode_attributes(element, _WHOLE_BYTES), element, form)
+            view = self._view(encode_attributes(element, WHOLE_BYTES), element, form)
             attributes |= {
                 "NORMAL": self._accessor(view, 0, FLOAT, count, "VEC3"),
                 "TANGENT": self._accessor(view, _NORMAL, FLOAT, count, "VEC4"),
@@ -183,7 +183,7 @@ class CompressedBuffer:
         if curved:
             normals = np.concatenate([p.normals for p in parts if p.normals is not None])
             element = np.pad(normals, ((0, 0), (0, 1))).view(np.uint8)
-            stream = encode_attributes(element, _WHOLE_BYTES)
+            stream = encode_attributes(element, WHOLE_BYTES)
             view = self._view(stream, element, {"mode": "ATTRIBUTES"})
             attributes["NORMAL"] = self._accessor(view, 0, BYTE, count, "VEC3", _NORMALIZED)
         both = attributes
@@ -193,7 +193,7 @@ class CompressedBuffer:
         if painted:
             colors = np.concatenate([p.color for p in parts if p.color is not None]).astype("<u2")
             element = np.ascontiguousarray(colors).view(np.uint8).reshape(count, _COLOR)
-            stream = encode_attributes(element, _WHOLE_BYTES)
+            stream = encode_attributes(element, WHOLE_BYTES)
             view = self._view(stream, element, {"mode": "ATTRIBUTES"})
             color = {"COLOR_0": self._accessor(view, 0, SHORT, count, "VEC4", _NORMALIZED)}
             attributes, both = attributes | color, both | color

@@ -3,30 +3,39 @@
 
 They read no names and no URIs of a cell's GLB, and the page draws shapes of one look together. The
 document loses these, objects become one node, and shapes of one look that lie side by side one
-primitive; the arrays stay byte for byte. With gzip that saves 15 % in the sample museum and 11 % in
-the hospital. Textures that browsers do not read are encoded again, and a site without exact levels
-has them without these.
+primitive; the arrays stay byte for byte, but for colours. With gzip that saves 15 % in the sample
+museum and 11 % in the hospital. Colours of vertices, linear light in 16 bits, have 256 values:
+their sRGB codes, red and blue less green, take a quarter of the bytes, and a bathroom of 170,000
+triangles with its light at vertices less than half. Textures that browsers do not read are encoded
+again, and a site without exact levels has them without these.
 """
 
 from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ptmtools.errors import InputError, naming
 from ptmtools.files import open_regular
-from ptmtools.glb import COMPONENTS
+from ptmtools.glb import COMPONENTS, UNSIGNED
+from ptmtools.meshopt.decoding import decode
+from ptmtools.meshopt.encoding import encode_attributes
 from ptmtools.output.gltf import pack, unpack
-from ptmtools.output.gltf_compressed import MESHOPT
+from ptmtools.output.gltf_compressed import MESHOPT, WHOLE_BYTES
 from ptmtools.output.model import offsets_of, sizes_of
+from ptmtools.scene.colors import encode_srgb
 from ptmtools.store.folder import damage_error, reading_error
 
 #: Textures that the page decodes.
 PROFILES, KIND, VERSION = ("fast", "raw"), "uint8", 2
+#: The attribute of colours: sRGB codes of green, of red and blue less that, modulo 256, and 0.
+CODES = "_COLOR"
 #: The members of a material, of its surface and of its extras that the page reads.
 _LOOK = ("alphaMode", "alphaCutoff", "doubleSided")
 _SURFACE = ("baseColorFactor",)
@@ -152,7 +161,10 @@ def lean_glb(data: bytes) -> bytes:
     accessors: list[dict[str, Any]] = document.get("accessors", [])
     # Equal arrays of plain cells share an accessor.
     required = document.get("extensionsRequired", [])
-    merged = _merge(primitives, accessors) if MESHOPT in required else primitives
+    merged = primitives
+    if MESHOPT in required:
+        binary = _code_colors(document, primitives, binary)
+        merged = _merge(primitives, accessors)
     used = sorted({a for p in merged for a in (*p["attributes"].values(), p["indices"])})
     place = {accessor: n for n, accessor in enumerate(used)}
     for primitive in merged:
@@ -170,6 +182,36 @@ def lean_glb(data: bytes) -> bytes:
         lean["accessors"] = [accessors[number] for number in used]
         lean |= {name: document[name] for name in ("bufferViews", "buffers")}
     return pack(lean, binary)
+
+
+def _code_colors(
+    document: Mapping[str, Any], primitives: Sequence[dict[str, Any]], binary: bytes
+) -> bytes:
+    """The buffer with codes in place of the colours of vertices; changes the document with it."""
+    painted = [p["attributes"] for p in primitives if "COLOR_0" in p["attributes"]]
+    colors = {document["accessors"][a["COLOR_0"]]["bufferView"] for a in painted}
+    for number in {attributes["COLOR_0"] for attributes in painted}:
+        document["accessors"][number] |= {"componentType": UNSIGNED, "normalized": False}
+    for attributes in painted:
+        attributes[CODES] = attributes.pop("COLOR_0")
+    data = b""
+    for number, view in enumerate(document.get("bufferViews", ()) if colors else ()):
+        coded = view["extensions"][MESHOPT]
+        begin = coded.get("byteOffset", 0)
+        stream = binary[begin : begin + coded["byteLength"]]
+        if number in colors:
+            code = encode_srgb(np.frombuffer(decode(stream, coded), "<u2").reshape(-1, 4) / 65535)
+            code[:, [0, 2]] -= code[:, [1]]
+            code[:, 3] = 0
+            stream = encode_attributes(code, WHOLE_BYTES)
+            view |= {"byteLength": code.size, "byteStride": 4}
+            coded["byteStride"] = 4
+        data += bytes(-len(data) % 4)
+        coded |= {"byteOffset": len(data), "byteLength": len(stream)}
+        data += stream
+    if colors:
+        document["buffers"][0]["byteLength"] = len(data)
+    return data or binary
 
 
 def _look(material: Mapping[str, Any], of_object: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.glb import COMPONENTS
 from ptmtools.output.gltf import pack, unpack
+from ptmtools.output.gltf_compressed import CompressedBuffer
+from ptmtools.output.gltf_shapes import Vertices
+from ptmtools.scene.colors import to_linear
 from ptmtools.site.conversion import lean_glb
 from tests.e2e.conftest import make_museum
+from tests.web import node
+
+HERE = Path(__file__).parent
 
 UNREAD = ("name", "metallicFactor", "roughnessFactor", "ptm")
 UNREAD += ("baseColorTexture", "occlusionTexture")
@@ -70,6 +78,36 @@ def test_the_same_triangles_with_the_same_looks(cells: dict[str, list[bytes]], f
         count = [sum(len(m["primitives"]) for m in t["meshes"]) for t in (before, tree)]
         fewer += count[1] < count[0]
     assert (fewer > 0) == (form == "compressed")
+
+
+def test_the_page_reads_the_same_colours(tmp_path: Path) -> None:
+    """All codes, at vertices of two shapes, one of which is white."""
+    code = np.random.default_rng(3).permutation(np.arange(768) % 256).reshape(-1, 3)
+    color = np.full((len(code), 4), 65535, np.uint16)
+    color[:, :3] = np.rint(65535 * to_linear(code / 255))
+    point = np.arange(3 * len(code), dtype=np.float32).reshape(-1, 3) ** 2 % 97
+    corner = np.arange(len(code) - 1).reshape(-1, 3)
+    buffer = CompressedBuffer(-10)
+    shapes = [Vertices(point, None, rows, corner) for rows in (color, None)]
+    primitives = [buffer.take(shape, 0, (None, None, None)) for shape in shapes]
+    buffer.finish()
+    tree = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0], "extras": {"cell": 0}}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": primitives}],
+        "materials": [{"pbrMetallicRoughness": {}}],
+    } | buffer.members()
+    whole = pack(tree, buffer.bytes())
+    lean = lean_glb(whole)
+    assert b"COLOR_0" in whole
+    assert b"COLOR_0" not in lean
+    for name, data in (("whole", whole), ("lean", lean)):
+        (tmp_path / f"{name}.glb").write_bytes(data)
+    files = tmp_path / "whole.glb", tmp_path / "lean.glb"
+    before, after = json.loads(node.run(HERE / "painted.mjs", *files))
+    assert sorted(before, key=str) == sorted(after, key=str)
+    assert sorted(len(shape["colors"] or ()) for shape in after) == [0, 4 * len(np.unique(corner))]
 
 
 def test_an_empty_cell() -> None:

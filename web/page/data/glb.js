@@ -33,13 +33,23 @@ const GLTF = 0x46546c67, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942;
 const CLAMP = 33071;
 /** Milliseconds of reading without a pause. */
 const AT_ONCE = 6;
-/** @type {Record<number, typeof Float32Array | typeof Int8Array | typeof Uint16Array | typeof Uint32Array>} */
-const ARRAYS = { 5126: Float32Array, 5120: Int8Array, 5123: Uint16Array, 5125: Uint32Array };
+/** @type {Record<number, typeof Float32Array | typeof Int8Array | typeof Uint8Array | typeof Uint16Array | typeof Uint32Array>} */
+const ARRAYS = { 5126: Float32Array, 5120: Int8Array, 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array };
 /** @type {Record<string, number>} */
 const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 /** @typedef {import("../../ptm/src/meshopt.js").ViewDecoder} ViewDecoder */
-/** @typedef {Float32Array | Int8Array | Uint16Array | Uint32Array} Numbers */
+/** @typedef {Float32Array | Int8Array | Uint8Array | Uint16Array | Uint32Array} Numbers */
+
+/** Linear light of sRGB codes, of 65535. */
+const LINEAR = Array.from({ length: 256 }, (_, code) =>
+  Math.round(65535 * (code < 11 ? code / 255 / 12.92 : ((code / 255 + 0.055) / 1.055) ** 2.4)));
+
+/** Linear colours of the codes red − green, green, blue − green, modulo 256, and 0. @param {Uint8Array} codes */
+function colorsOf(codes) {
+  return new Uint16Array(codes).map((code, k) =>
+    k % 4 > 2 ? 65535 : LINEAR[k % 4 === 1 ? code : (code + codes[k - k % 4 + 1]) & 255]);
+}
 
 /** The arrays of a GLB, by the numbers of their accessors. */
 class Arrays {
@@ -77,6 +87,7 @@ class Arrays {
         for (let n = 0; n < items; n++) numbers[items * k + n] = all[at + n];
       }
     }
+    if (numbers instanceof Uint8Array) numbers = colorsOf(numbers);
     this.#read.set(number, numbers);
     return numbers;
   }
@@ -180,11 +191,11 @@ export async function readGlb(buffer, textures, decoder) {
       const { texture = -1, mesh = -1, octree = -1, light = -1, white = light < 0 ? 0 : NaN, probe = -1, normal = -1, normalCoords, wrapS, wrapT } =
         look.extras ?? {};
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
-      const painted = attributes.COLOR_0 !== undefined;
+      const color = attributes._COLOR ?? attributes.COLOR_0, painted = color !== undefined;
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
       await pause();
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
-      const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(attributes.COLOR_0)) : null;
+      const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(color)) : null;
       const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
       const normals = probe >= 0 && "NORMAL" in attributes ? arrays.vertices(attributes.NORMAL) : null;
       const framed = normalCoords === undefined ? ["TEXCOORD_1", "NORMAL", "TANGENT"] : ["TEXCOORD_" + normalCoords];
