@@ -3,7 +3,7 @@ cells.
 
 Preparing it takes most of the time; a run then takes a second.
 
-A walk that begins at the first viewpoint gets the opening of the site
+A walk that begins at the first viewpoint, or in a small site, gets the opening
 (`ptmtools.site.opening`): its parts arrive one after the other in one response, which is requested
 together with the index.
 """
@@ -25,7 +25,7 @@ from ptmtools.rendering.rays import Frustum, RayCamera
 from ptmtools.rendering.records import Pyramids, Shows
 from ptmtools.rendering.tone import show_vertex_light
 from ptmtools.site.client import ITEM_PIXELS
-from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps
+from ptmtools.site.opening import NeedFinder, contents_of, ordered_steps, other_rooms
 from ptmtools.walk import Browser
 from ptmtools_lab.catalogue import Catalogue, catalogue_of
 from ptmtools_lab.forms import FORMS, PTM
@@ -44,7 +44,8 @@ NEAR, ALIKE = 0.5, np.cos(np.radians(10.0))
 
 
 def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Floats) -> Parts:
-    """The parts for a walk that begins with a view; none if it begins elsewhere, or without Embree.
+    """The parts for a walk that begins with a view; none without Embree, or if it begins elsewhere
+    and the opening lacks other rooms.
 
     Parameters
     ----------
@@ -58,8 +59,6 @@ def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Flo
     view = views[0]
     away = np.linalg.norm(eye - np.array(view["position"]))
     aside = direction @ np.array(view["direction"]) / np.linalg.norm(direction)
-    if away > NEAR or aside < ALIKE:
-        return ()
     try:
         needs = NeedFinder(served).needs(view)
     except ImportError:
@@ -71,7 +70,12 @@ def opening_of(served: Served, catalogue: Catalogue, eye: Floats, direction: Flo
         )
         for cell, size in enumerate(bytes_)
     }  # fmt: skip
-    parts, _ = contents_of(ordered_steps(served.index, needs, view["cell"], sizes))
+    steps = ordered_steps(served.index, needs, view["cell"], sizes)
+    rest = other_rooms(served.index, steps, sizes)
+    if rest is None and (away > NEAR or aside < ALIKE):
+        return ()
+    # Each counts as its file, with more bytes than in the stream of the opening.
+    parts, _ = contents_of([*steps, *(rest or ())])
     return tuple((part.kind, part.number, part.end) for part in parts)
 
 

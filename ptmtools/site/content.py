@@ -46,6 +46,8 @@ OPENING = "application/octet-stream"
 _LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook")
 _IMAGE_MEDIA = {format.suffix: format.media for format in FORMATS.values()}
 _VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"} | _IMAGE_MEDIA
+#: Largest poster, as a share of the site: a building of few bytes is there as soon as its picture.
+POSTER_SHARE = 0.1
 #: First bytes of pictures: pattern, media type, suffix.
 _MAGIC = (
     (rb"\xff\xd8\xff", JPEG, ".jpg"),
@@ -124,8 +126,8 @@ class _Builder:
         index["textures"] = list(self._textures())
         for form in texture_forms(self._served.index):
             index[form.member] = self._texture_form(form)
-        index["viewpoints"], poster = self._pictures()
-        openings = self._openings(index) if self._options.opening else ()
+        index["viewpoints"], poster, picture = self._pictures()
+        openings = self._openings(index) if self._options.opening else {}
         if self._options.clients == "vrml":
             self._vrml()
         text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
@@ -138,6 +140,7 @@ class _Builder:
             index,
             f"{DATA}/{name}",
             poster,
+            picture,
             openings,
         )
 
@@ -148,32 +151,36 @@ class _Builder:
 
         return build_with_tour()
 
-    def _openings(self, index: Mapping[str, Any]) -> tuple[str, ...]:
-        """The URLs of the openings of the first viewpoints; none where Embree is missing."""
+    def _openings(self, index: Mapping[str, Any]) -> dict[str, Sequence[float]]:
+        """The URLs of the openings, and the addresses of their views, see `openings_of`; none where
+        Embree is missing."""
         from ptmtools.site.opening import openings_of
 
         previews = [p["file"] for row in index["textures"] for p in row.get("previews", ())]
 
-        def read(kind: str, number: int, end: int | None) -> bytes:
+        def read(kind: str, number: int, end: int) -> bytes:
             if kind == "preview":
                 url = previews[number]
             elif kind == "texture":
                 url = index["textures"][number]["file"]
             else:
                 url = index["cells"][number][kind]
-            return self._files.entries[f"{DATA}/{url}"].read(end)
+            return self._files.entries[f"{DATA}/{url}"].read(end if kind == "texture" else None)
 
-        entries = (entry for entry in self._files.entries.values() if not is_other_form(entry.name))
-        size = sum(entry.state[2] if entry.state else len(entry.read()) for entry in entries)
         try:
-            data = list(openings_of(self._served, index, read, size))
+            openings = list(openings_of(self._served, index, read, self._size()))
         except ImportError:
-            return ()
-        mark = sha256("".join(map(sha256, data)).encode())
-        return tuple(
-            f"{DATA}/{self._files.add('opening', f'-{number}.bin', OPENING, opening, mark=mark)}"
-            for number, opening in enumerate(data)
-        )
+            return {}
+        mark = sha256("".join(sha256(data) for data, _ in openings).encode())
+        return {
+            f"{DATA}/{self._files.add('opening', f'-{number}.bin', OPENING, data, mark=mark)}": view
+            for number, (data, view) in enumerate(openings)
+        }
+
+    def _size(self) -> int:
+        """Bytes of the files so far."""
+        entries = (entry for entry in self._files.entries.values() if not is_other_form(entry.name))
+        return sum(entry.state[2] if entry.state else len(entry.read()) for entry in entries)
 
     def _cells(self) -> Iterator[dict[str, Any]]:
         index = self._served.index
@@ -263,10 +270,11 @@ class _Builder:
             name = self._files.add(file.stem, file.suffix, media, file, digest=digest, mark=mark)
             yield {key: value for key, value in row.items() if key != "error"} | {"file": name}
 
-    def _pictures(self) -> tuple[list[dict[str, Any]], str]:
-        """The viewpoints, and the URL of the poster, "" without one."""
+    def _pictures(self) -> tuple[list[dict[str, Any]], str, str]:
+        """The viewpoints, and the URLs of the poster and of a picture for link previews, ""
+        without."""
         rows = [dict(row) for row in self._served.index["viewpoints"]]
-        poster = ""
+        poster = picture = ""
         if self._options.poster:
             media, suffix, data = _picture_file(self._options.poster)
             poster = self._files.add("poster", suffix, media, data)
@@ -275,10 +283,13 @@ class _Builder:
             both = self._files.render(lambda: _viewpoints(self._served), self._folder.path)
             drawn, small = both or (b"", [])
             if drawn and not poster:
-                poster = self._files.add("poster", ".jpg", JPEG, drawn)
+                light = len(drawn) <= POSTER_SHARE * self._size()
+                picture = self._files.add("poster" if light else "picture", ".jpg", JPEG, drawn)
+                poster = picture if light else ""
             for number, (row, data) in enumerate(zip(rows, small, strict=False)):
                 row["thumbnail"] = self._files.add(f"vp-{number:03}", ".jpg", JPEG, data)
-        return rows, poster and f"{DATA}/{poster}"
+        poster, picture = (name and f"{DATA}/{name}" for name in (poster, picture or poster))
+        return rows, poster, picture
 
     def _vrml(self) -> None:
         """The files of VRML, under the names that they have in the database."""

@@ -20,7 +20,6 @@ from ptmtools.site.program import (
     HTML,
     WORKER,
     add_policy,
-    address_of,
     fixed_script,
     page,
     program_files,
@@ -42,7 +41,7 @@ class SiteOptions:
     poster: str = option(
         "",
         "Picture (JPEG, PNG or WebP) to show while the building loads. Default: a rendered image "
-        "from the first viewpoint.",
+        "from the first viewpoint, unless the building itself is small.",
         metavar="FILE",
     )
     description: str = option(
@@ -98,7 +97,8 @@ class Front:
     ----------
     title: of the site, if its tour has none.
     index: the document that the page reads first. url: its URL.
-    poster: the URL of the poster, "" without one. openings: those of the openings.
+    poster: the URL of the poster, "" without one. picture: of that for link previews.
+    openings: those of the openings, and the addresses of their views; see `program.page`.
     """
 
     folder: DatabaseFolder
@@ -108,7 +108,8 @@ class Front:
     index: Mapping[str, Any]
     url: str
     poster: str
-    openings: Sequence[str]
+    picture: str
+    openings: Mapping[str, Sequence[float]]
 
     def add(self, files: SiteFiles) -> str:
         """Adds the files; returns the title of the page. Raises as `site_tour`; InputError
@@ -131,14 +132,13 @@ class Front:
         if not self.openings:
             first = self.index["cells"][viewpoints[0]["cell"]]
             preload += [f"{DATA}/{first[kind]}" for kind in ("record", "geometry")]
-        views = dict(zip(self.openings, map(address_of, viewpoints), strict=False))
         written = self.options.description or (tour and tour.text("description"))
         description = written or description_of(viewpoints, *([tour.place] if tour else []))
-        head = [*About(title, description, self.poster, self.options.address).lines()]
+        head = [*About(title, description, self.picture, self.options.address).lines()]
         if self.options.offline:
             files.put(fixed_script(WORKER))
             head.append(registration(program))
-        files.put(page(settings, program["viewer.js"].name, preload, views, head))
+        files.put(page(settings, program["viewer.js"].name, preload, self.openings, head))
         add_manifest(files, title)
         return title
 

@@ -12,6 +12,12 @@ look.) The first viewpoint has one, and those after it as long as the openings r
 site: links lead to these. The order is that of the client (docs/formats/client.md): the
 worth of a step by the pixels that need it, per byte.
 
+A site no larger than `WHOLE` has one opening, with the records, geometry and small textures of all
+cells after what its view needs: those of a small building take half the bytes in one gzip stream,
+as most of a small GLB or AVIF is a head like that of the others.
+
+The file is one gzip stream, of which a browser unpacks the parts as they arrive:
+
 =======  ============================================================
 offset   little-endian
 =======  ============================================================
@@ -21,19 +27,19 @@ offset   little-endian
 then     the parts, one after the other
 =======  ============================================================
 
-Kinds: ``record`` and ``geometry`` of a cell, as gzip packs the file; ``texture``, the beginning of
-a `.ptm`; ``preview``, a file. Textures are numbered as in the index, previews in its order, over
-all textures. A screen with at most the lines of its pair does not need a preview.
+Kinds: ``record`` and ``geometry`` of a cell; ``texture``, the beginning of a `.ptm`; ``preview``, a
+file. Textures are numbered as in the index, previews in its order, over all textures. A screen with
+at most the lines of its pair does not need a preview.
 """
 
 from __future__ import annotations
 
+import gzip
 import json
 import math
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from itertools import accumulate
 from typing import Any
 
@@ -48,14 +54,17 @@ from ptmtools.rendering.rays import Caster, RayCamera
 from ptmtools.rendering.records import triangles_of
 from ptmtools.site.choice import next_fetch, previews_of
 from ptmtools.site.client import LEAST_DIFFERENCE, NOTHING, OVERHEAD
+from ptmtools.site.program import address_of
 from ptmtools.texture.previews import coarse_levels
 
 #: Pixels of the view, and its aspect.
 WIDTH, HEIGHT = 160, 90
 #: Lines of the screen, and by how many powers of two finer a texture may be needed than it is.
 LINES, FINER = 1080, 4
-#: Largest preview that is a part, bytes.
+#: Largest preview that is a part, and largest texture with its previews of another room, bytes.
 SMALL = 4096
+#: Largest site with all rooms in an opening, bytes on the link without page, index and meshes.
+WHOLE = 1 << 18
 #: Share of a texture's pixels that may need a finer level than those of the opening.
 FEW = 0.02
 #: Largest share of a site that openings after the first repeat; the most openings: the page lists
@@ -207,6 +216,27 @@ def ordered_steps(
     return [whole("record", cell, np.inf), whole("geometry", cell, np.inf), *steps]
 
 
+def other_rooms(
+    index: Mapping[str, Any], steps: Sequence[OpeningStep], sizes: Mapping[tuple[str, int], int]
+) -> list[OpeningStep] | None:
+    """The records, geometry and small textures of all cells that are not among the ``steps`` of a
+    view, by kind; None if all files of a site are larger than `WHOLE` together. ``sizes``: see
+    `ordered_steps`."""
+    files, first, size = dict(sizes), 0, sum(sizes.values())
+    for number, row in enumerate(index["textures"]):
+        whole = {("texture", number): int(row["ends"][-1])}
+        for at, preview in enumerate(row.get("previews", ()), first):
+            whole["preview", at] = int(preview["bytes"])
+        first += len(whole) - 1
+        size += sum(whole.values())
+        if sum(whole.values()) <= SMALL:
+            files |= whole
+    if size > WHOLE:
+        return None
+    rest = sorted(files.keys() - {(step.kind, step.number) for step in steps})
+    return [OpeningStep(*key, files[key], files[key], 0.0) for key in rest]
+
+
 def contents_of(steps: Sequence[OpeningStep]) -> tuple[list[OpeningStep], list[OpeningStep]]:
     """The parts of the file, and the previews that follow it."""
     ends = {step.number: step.end for step in steps if step.kind == "texture"}
@@ -223,8 +253,7 @@ def contents_of(steps: Sequence[OpeningStep]) -> tuple[list[OpeningStep], list[O
 
 
 def packed_opening(steps: Sequence[OpeningStep], read: Callable[[str, int, int], bytes]) -> bytes:
-    """The file; ``read`` returns the bytes of the file of a kind and number up to an end, as gzip
-    packs those of cells."""
+    """The file; ``read`` returns the bytes of the file of a kind and number up to an end."""
     contents, later = contents_of(steps)
     parts, data = [], []
     for step in contents:
@@ -233,16 +262,24 @@ def packed_opening(steps: Sequence[OpeningStep], read: Callable[[str, int, int],
         data.append(body)
     after = [[step.number, step.lines] for step in later]
     text = json.dumps({"parts": parts, "next": after}, separators=(",", ":")).encode()
-    return b"".join([_LENGTH.pack(len(text)), text, *data])
+    return compress(b"".join([_LENGTH.pack(len(text)), text, *data]))
+
+
+def parts_of(opening: bytes) -> list[tuple[str, int, int]]:
+    """Kind, number and bytes of each part of an opening."""
+    data = gzip.decompress(opening)
+    end = _LENGTH.size + _LENGTH.unpack_from(data)[0]
+    return [(kind, number, size) for kind, number, size in json.loads(data[4:end])["parts"]]
 
 
 def openings_of(
     served: Served,
     index: Mapping[str, Any],
-    read: Callable[[str, int, int | None], bytes],
+    read: Callable[[str, int, int], bytes],
     size: int,
-) -> Iterator[bytes]:
-    """The openings of the first viewpoints of a site.
+) -> Iterator[tuple[bytes, Sequence[float]]]:
+    """The openings of the first viewpoints of a site, and the addresses of their views; a single
+    one, without address, if it has all rooms.
 
     Parameters
     ----------
@@ -258,20 +295,19 @@ def openings_of(
         for kind in ("record", "geometry")
     }
 
-    @cache
-    def pack(kind: str, number: int, end: int) -> bytes:
-        whole = kind in ("record", "geometry")
-        return compress(read(kind, number, None)) if whole else read(kind, number, end)
-
     repeatable = size * REPEATED
     # The page shows all views with the angle of the first.
     angle = {"fieldOfView": index["viewpoints"][0]["fieldOfView"]}
     for number, viewpoint in enumerate(index["viewpoints"][:MOST]):
         needs = views.needs({**viewpoint, **angle})
         steps = ordered_steps(index, needs, viewpoint["cell"], sizes)
-        data = packed_opening(steps, pack)
+        rest = None if number else other_rooms(index, steps, sizes)
+        data = packed_opening([*steps, *(rest or ())], read)
         if number:
             repeatable -= len(data)
             if repeatable < 0:
                 return
-        yield data
+        if rest is not None:
+            yield data, ()
+            return
+        yield data, address_of(viewpoint)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -60,7 +61,8 @@ Digests = dict[str, tuple[str, ...]]
 #: Format of the list of our files.
 FORMAT, SCHEMA = "ptmtools site files", 1
 #: Data that the walk does not show before a panel asks for them, and copies of other data.
-_NOT_OF_WALK = tuple(f"{DATA}/{name}-" for name in ("work", "icon", "vp", "opening"))
+_NOT_OF_WALK = tuple(f"{DATA}/{name}-" for name in ("work", "icon", "vp", "opening", "picture"))
+_FIRST_OPENING = rf"{DATA}/opening-\w+-0\.bin"
 
 
 def publish(
@@ -206,11 +208,11 @@ class Weight:
     Attributes
     ----------
     page: the page, the viewer, a worker and the decoder, which come before the building.
-    first_room: the page, the poster, the index, and the room of the first viewpoint.
+    first_room: the page, its poster, the index, and the room of the first viewpoint.
     mean_room, worst_room: record and geometry of a room, and of the textures in it the levels up to
         `COARSE` texels. Of all cells in which one can stand; worst_cell is the heaviest.
-    whole: all that a walk can need. Openings, which repeat parts of other files that the page then
-        does not fetch, do not count, nor do pictures in panels and VRML files.
+    whole: all that a walk from the first viewpoint can need: its opening in place of what that
+        has of other files. Pictures in panels and VRML files do not count.
     """
 
     page: int
@@ -223,6 +225,8 @@ class Weight:
 
 def weight_of(site: Site) -> Weight:
     """The bytes of a site."""
+    from ptmtools.site.opening import parts_of
+
     index = site.index
     rooms = {
         number: _room(site.entries, index, row)
@@ -235,6 +239,11 @@ def weight_of(site: Site) -> Weight:
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     unused = {*LATER, *attached_scripts()} - used
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, unused)}
+    begin = next((n for n in site.entries if re.fullmatch(_FIRST_OPENING, n)), "")
+    repeated = 0
+    for kind, number, size in parts_of(site.entries[begin].read()) if begin else ():
+        whole = kind in ("record", "geometry")
+        repeated += index["cells"][number][f"{kind}Bytes"] if whole else size
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
     before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
@@ -246,7 +255,7 @@ def weight_of(site: Site) -> Weight:
         mean_room=round(sum(rooms.values()) / len(rooms)),
         worst_room=rooms[worst],
         worst_cell=worst,
-        whole=sum(bytes_of.values()),
+        whole=sum(bytes_of.values()) - repeated + (link_bytes(site.entries[begin]) if begin else 0),
     )
 
 

@@ -13,6 +13,7 @@ from hypothesis import Phase, given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.link import Conditions
+from ptmtools.site import opening as openings
 from ptmtools_lab.client import Client, FileKind, Range
 from ptmtools_lab.network import FluidLink, Request
 from ptmtools_lab.policies import POLICIES
@@ -300,10 +301,17 @@ def test_an_opening_brings_the_first_view_after_one_latency() -> None:
     assert run.column[-1].tolist() == without.column[-1].tolist() == [4, 5]
 
 
-def test_only_a_walk_from_the_viewpoint_has_the_opening(world: World) -> None:
+def test_only_a_walk_from_the_viewpoint_has_the_opening(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unless that has all rooms."""
     served, stock = world.served, world.catalogue
     view = served.index["viewpoints"][0]
     eye, direction = (np.array(view[name]) for name in ("position", "direction"))
+    monkeypatch.setattr(openings, "WHOLE", 1 << 40)
+    everything = opening_of(served, stock, eye + 2, direction)
+    assert sum(kind == "geometry" for kind, *_ in everything) == served.cell_count
+    monkeypatch.setattr(openings, "WHOLE", 0)
     parts = opening_of(served, stock, eye + 0.2, direction)
     kinds = [kind for kind, _, _ in parts]
     assert kinds[:2] == ["record", "geometry"]

@@ -29,6 +29,7 @@ from ptmtools.site.opening import (
     texture_steps,
 )
 from ptmtools.site.program import address_of
+from ptmtools.site.publishing import weight_of
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,8 @@ def site(two_rooms: Path) -> Site:
     return site_of(two_rooms, SiteOptions(pictures=False))
 
 
-def parts_of(data: bytes) -> Iterator[tuple[str, int, bytes]]:
+def parts_of(opening: bytes) -> Iterator[tuple[str, int, bytes]]:
+    data = gzip.decompress(opening)
     (length,) = struct.unpack_from("<I", data)
     at = 4 + length
     for kind, number, size in json.loads(data[4:at])["parts"]:
@@ -84,7 +86,7 @@ def test_parts_are_the_files_or_their_beginnings(site: Site) -> None:
             assert data == whole
             assert len(data) <= SMALL
         else:
-            assert gzip.decompress(data) == whole
+            assert data == whole
 
 
 def test_the_page_names_it(site: Site) -> None:
@@ -93,16 +95,18 @@ def test_the_page_names_it(site: Site) -> None:
 
 
 def test_the_first_views_have_one_each_while_they_repeat_little(
-    two_rooms: Path, site: Site, monkeypatch: pytest.MonkeyPatch
+    two_rooms: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They are numbered, and the page has their addresses."""
+    monkeypatch.setattr(opening, "WHOLE", 0)
+    first = opening_of(site_of(two_rooms, SiteOptions(pictures=False)))
     monkeypatch.setattr(opening, "REPEATED", 1.0)
     every = site_of(two_rooms, SiteOptions(pictures=False))
     views = every.index["viewpoints"]
     assert len(views) > 1
     names = names_of(every)
     assert [name.rpartition("-")[2] for name in names] == [f"{n}.bin" for n in range(len(views))]
-    assert every.entries[names[0]].read() == opening_of(site)
+    assert every.entries[names[0]].read() == first
     for name, view in zip(names, views, strict=True):
         parts = [*parts_of(every.entries[name].read())]
         assert [part[:2] for part in parts[:2]] == [
@@ -121,6 +125,28 @@ def test_the_first_views_have_one_each_while_they_repeat_little(
     monkeypatch.setattr(opening, "REPEATED", 0.0)
     (alone,) = names_of(site_of(two_rooms, SiteOptions(pictures=False)))
     assert alone.endswith("-0.bin")
+
+
+def test_that_of_a_small_site_has_all_rooms(
+    two_rooms: Path, site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has no view, and takes fewer bytes than its files."""
+    cells, textures = (range(len(site.index[name])) for name in ("cells", "textures"))
+    assert len(names_of(site)) == 1
+    parts = {(kind, number): data for kind, number, data in parts_of(opening_of(site))}
+    for kind, numbers in (("record", cells), ("geometry", cells), ("texture", textures)):
+        for number in numbers:
+            assert parts[kind, number] == read(site, kind, number)[: len(parts[kind, number])]
+    assert "data-views=" not in site.entries["index.html"].read().decode()
+    separate = site_of(two_rooms, SiteOptions(pictures=False, opening=False))
+    assert weight_of(site).whole < weight_of(separate).whole
+    size = sum(row["recordBytes"] + row["geometryBytes"] for row in site.index["cells"])
+    size += sum(row["ends"][-1] for row in site.index["textures"])
+    size += sum(p["bytes"] for row in site.index["textures"] for p in row.get("previews", ()))
+    for most, expected in ((size, len(cells)), (size - 1, 1)):
+        monkeypatch.setattr(opening, "WHOLE", most)
+        data = opening_of(site_of(two_rooms, SiteOptions(pictures=False)))
+        assert sum(kind == "record" for kind, *_ in parts_of(data)) == expected
 
 
 @pytest.mark.parametrize(
@@ -240,8 +266,9 @@ def test_steps_come_by_worth_per_byte() -> None:
     assert all(one >= other for one, other in pairwise(densities))
     finest = {step.number for step in steps if step.kind == "preview"}
     assert {2, 5} <= finest  # that of the first texture, and of the second
-    data = packed_opening(steps, lambda kind, number, end: bytes(20_000))
-    parts = [*parts_of(data)]
+    opening = packed_opening(steps, lambda kind, number, end: bytes(20_000))
+    parts = [*parts_of(opening)]
+    data = gzip.decompress(opening)
     (length,) = struct.unpack_from("<I", data)
     assert json.loads(data[4 : 4 + length])["next"] == [[2, 763], [5, 270]]
     assert not {("preview", 2), ("preview", 5)} & {part[:2] for part in parts}

@@ -21,12 +21,13 @@ from PIL import Image
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.output.emission import compress
-from ptmtools.site import pictures as drawing
+from ptmtools.site import content, pictures as drawing
 from ptmtools.site.about import MANIFEST
 from ptmtools.site.content import Site, SiteOptions, site_of, title_of
 from ptmtools.site.conversion import SiteTexture, lean_glb, web_texture, without_exact
 from ptmtools.site.entry import is_marked, link_bytes
 from ptmtools.site.files import DATA
+from ptmtools.site.opening import parts_of
 from ptmtools.site.program import ELEMENT, LATER, PROGRAM, attached_scripts
 from ptmtools.site.publishing import weight_of
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
@@ -36,9 +37,16 @@ PLAIN = SiteOptions(pictures=False)
 LARGEST_PAGE = 56_400
 
 
+def with_poster(database: Path) -> Site:
+    """As a larger one has it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(content, "POSTER_SHARE", 10.0)
+        return site_of(database)
+
+
 @pytest.fixture(scope="module")
 def site(two_rooms: Path) -> Site:
-    return site_of(two_rooms)
+    return with_poster(two_rooms)
 
 
 @pytest.fixture
@@ -82,7 +90,7 @@ def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
     program = {name for name in site.entries if name.startswith("viewer-")}
     assert len({name.split("/")[0] for name in program}) == 1
     assert {name.split("/")[1] for name in program} == {*PROGRAM, *attached_scripts()}
-    again = site_of(two_rooms)
+    again = with_poster(two_rooms)
     assert {n: e.read() for n, e in again.entries.items()} == {
         n: e.read() for n, e in site.entries.items()
     }
@@ -204,6 +212,18 @@ def test_pictures(site: Site) -> None:
         small = site.entries[f"data/{row['thumbnail']}"].read()
         assert len(small) <= drawing.SMALL.most
         assert Image.open(io.BytesIO(small)).size == drawing.SMALL.size
+
+
+def test_a_poster_heavier_than_the_building_is_not_shown(two_rooms: Path) -> None:
+    """Link previews have it."""
+    site = site_of(two_rooms)
+    (picture,) = (name for name in site.entries if name.startswith("data/picture-"))
+    assert told(site)["poster"] is None
+    page = site.entries["index.html"].read().decode()
+    assert f'<meta property="og:image" content="{picture}">' in page
+    assert "<img" not in page
+    unseen = {name: entry for name, entry in site.entries.items() if name != picture}
+    assert weight_of(site) == weight_of(Site(unseen, site.index))
 
 
 def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> None:
@@ -375,7 +395,12 @@ def test_weight(site: Site) -> None:
     assert {prefix for prefix in beside for name in sizes if name.startswith(prefix)} == {*beside}
     needed = [n for n in needed if n not in (ELEMENT, MANIFEST) and not n.startswith(beside)]
     assert weight.page == sum(sizes[name] for name in needed if not name.startswith("data/"))
-    assert weight.whole == sum(sizes[name] for name in needed)
+    (begin,) = (name for name in sizes if name.startswith("data/opening-"))
+    separate = 0
+    for kind, number, size in parts_of(site.entries[begin].read()):
+        in_cell = kind in ("record", "geometry")
+        separate += site.index["cells"][number][f"{kind}Bytes"] if in_cell else size
+    assert weight.whole == sum(sizes[name] for name in needed) - separate + sizes[begin]
     row = site.index["cells"][site.index["viewpoints"][0]["cell"]]
     record = json.loads(site.entries[f"data/{row['record']}"].read())
     room = sizes[f"data/{row['record']}"] + sizes[f"data/{row['geometry']}"]

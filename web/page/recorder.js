@@ -74,8 +74,10 @@ export class Recorder {
         const at = short(requestStart / 1000);
         if (name !== address) return [[at, ...(asked.get(name) ?? ["page", 0]), encodedBodySize]];
         // The first levels of textures count as the page's: a file is whole, or is not there.
-        return stream.opening?.parts.map(([kind, number, bytes]) => [at,
-          ...(kind === "texture" ? ["page", 0] : [kind, number]), bytes]) ?? [];
+        const { parts } = /** @type {NonNullable<typeof opening>} */ (opening);
+        const size = parts.reduce((sum, [, , bytes]) => sum + bytes, 0);
+        return parts.map(([kind, number, bytes]) => [at,
+          ...(kind === "texture" ? ["page", 0] : [kind, number]), Math.round(bytes * encodedBodySize / size)]);
       });
   }
 

@@ -1,14 +1,11 @@
 // An opening of a site: small files of a view, and beginnings of textures, which come with the page in one
-// file (docs/formats/hints.md). Each is a file of its own, too, so an opening that fails
-// costs nothing but time.
+// gzip stream (docs/formats/hints.md). Each is a file of its own, too, so an opening that fails
+// costs nothing but time, and nobody reads its errors.
 
 import { PATIENCE } from "./fetcher.js";
 
 /** @typedef {Uint8Array<ArrayBuffer>} Bytes */
 /** @typedef {import("../policy/downloads.js").Kind} Kind */
-
-/** Kinds that are compressed in it. */
-const PACKED = ["record", "geometry"];
 
 /**
  * A result; throws if it takes too long.
@@ -16,23 +13,14 @@ const PACKED = ["record", "geometry"];
  * @param {Promise<R>} result
  * @returns {Promise<R>}
  */
-async function patiently(result) {
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let timer;
-  const late = new Promise((_, fail) => {
-    timer = setTimeout(() => fail(new Error("nothing came")), 1000 * PATIENCE);
-  });
-  try {
-    return /** @type {R} */ (await Promise.race([result, late]));
-  } finally {
-    clearTimeout(timer);
-  }
+function patiently(result) {
+  return Promise.race([result, new Promise((_, fail) => {
+    setTimeout(() => fail(new Error()), 1000 * PATIENCE);
+  })]);
 }
 
-/** The bytes of a response as they arrive. */
+/** The bytes of a stream as they arrive. */
 class Arriving {
-  /** All that have come. */
-  count = 0;
   #bytes = new Uint8Array(0);
   #reader;
 
@@ -45,12 +33,8 @@ class Arriving {
   async take(count) {
     while (this.#bytes.length < count) {
       const { done, value } = await patiently(this.#reader.read());
-      if (done) throw new Error("is cut short");
-      this.count += value.length;
-      const longer = new Uint8Array(this.#bytes.length + value.length);
-      longer.set(this.#bytes);
-      longer.set(value, this.#bytes.length);
-      this.#bytes = longer;
+      if (done) throw new Error();
+      this.#bytes = new Uint8Array(await new Blob([this.#bytes, value]).arrayBuffer());
     }
     const taken = this.#bytes.slice(0, count);
     this.#bytes = this.#bytes.subarray(count);
@@ -61,11 +45,9 @@ class Arriving {
 export class Opening {
   /** Kind, number and bytes of each part, once known. @type {[Kind, number, number][]} */
   parts = [];
-  /** Bytes received. */
+  /** Bytes of the answer, as the host states them. */
   bytes = 0;
-  /** By kind and number. @type {Map<string, (part: Bytes | null) => void>} */
-  #waiting = new Map();
-  /** @type {Map<string, Promise<Bytes | null>>} */
+  /** By kind and number. @type {Map<string, Promise<Bytes | null>>} */
   #coming = new Map();
 
   /** @param {string} url */
@@ -79,31 +61,26 @@ export class Opening {
      */
     this.next = arriving.then(({ next }) => next, () => []);
     /** Resolved when all parts are here, or no more will come. @type {Promise<void>} */
-    this.over = arriving
-      .then(async ({ bytes }) => {
-        for (const [kind, number, size] of this.parts) {
-          const part = await bytes.take(size);
-          this.bytes = bytes.count;
-          this.#waiting.get(kind + number)?.(PACKED.includes(kind) ? await unpacked(part) : part);
-        }
-      })
-      .catch(() => {})
-      .finally(() => this.#waiting.forEach((come) => come(null)));
+    this.over = arriving.then(({ last }) => last).then(() => {}, () => {});
   }
 
-  /** @param {string} url @returns {Promise<{bytes: Arriving, next: [number, number][]}>} */
+  /** @param {string} url @returns {Promise<{last: Promise<unknown>, next: [number, number][]}>} */
   async #open(url) {
-    const { ok, body } = await patiently(fetch(url));
-    if (!ok || !body) throw new Error("cannot be downloaded");
-    const bytes = new Arriving(/** @type {ReadableStream<Bytes>} */ (body));
+    const { ok, body, headers } = await patiently(fetch(url));
+    if (!ok || !body) throw new Error();
+    this.bytes = Number(headers.get("content-length"));
+    const bytes = new Arriving(body.pipeThrough(new DecompressionStream("gzip")));
     const length = new DataView((await bytes.take(4)).buffer).getUint32(0, true);
     const { parts, next } = JSON.parse(new TextDecoder().decode(await bytes.take(length)));
-    for (const [kind, number] of parts) {
-      const key = kind + number;
-      this.#coming.set(key, new Promise((come) => this.#waiting.set(key, come)));
+    /** @type {Promise<unknown>} */
+    let last = Promise.resolve();
+    for (const [kind, number, size] of parts) {
+      const part = last.then(() => bytes.take(size));
+      this.#coming.set(kind + number, part.catch(() => null));
+      last = part;
     }
     this.parts = parts;
-    return { bytes, next };
+    return { last, next };
   }
 
   /**
@@ -115,10 +92,4 @@ export class Opening {
     await this.next;
     return (await this.#coming.get(kind + number)) ?? null;
   }
-}
-
-/** @param {Bytes} part @returns {Promise<Bytes>} */
-async function unpacked(part) {
-  const stream = new Blob([part]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
 }
