@@ -15,7 +15,9 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.light import cells
 from ptmtools.light.cells import (
     BYTES,
+    LEAST,
     SHARE,
+    TRIANGLE,
     affordable_density,
     expected_bytes,
     round_bytes,
@@ -46,8 +48,11 @@ def floor(side: float, **kind: bool) -> CellSurfaces:
 def test_lightmaps_fit_the_images() -> None:
     pieces = [floor(150.0), floor(150.0)]
     assert expected_bytes(pieces, 10.0) > 2 * BYTES
-    few = affordable_density(pieces, 10.0, 0)
+    few = affordable_density(pieces, 10.0, BYTES)
     assert expected_bytes(pieces, few) == pytest.approx(BYTES)
+    # Beside a model of four triangles without images there is less.
+    least = affordable_density(pieces, 10.0, 0)
+    assert expected_bytes(pieces, least) == pytest.approx(LEAST + 4 * TRIANGLE)
     # Beside images of up to ten times as many bytes it is the same.
     assert affordable_density(pieces, 10.0, int(BYTES / SHARE)) == pytest.approx(few)
     assert affordable_density(pieces, 10.0, int(1.5 * BYTES / SHARE)) == pytest.approx(
