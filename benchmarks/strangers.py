@@ -9,8 +9,11 @@ with ``--before`` a made model also with door leaves that hide nothing, without 
 of detail, and with all searches for visible cells. Seconds are of the processor, of the whole
 build, beside 10 s + 0.2 ms a triangle + 0.3 s a room; those by stage are of the clock. Memory is
 the peak. Resident is the share of the volume, its mean over places and its maximum, and of cells.
-Kilobytes are those until the first room is drawn, and until it has all objects as modelled; missed
-pairs are those that random segments find outside the sets.
+Kilobytes are those of the database until the first room is drawn, and until it has all objects as
+modelled. *Site* is what a visitor downloads in a walk through all rooms, without the page, which is
+the same for all (`ptm publish`); *first* is the index, the poster, and the first room with the
+geometry of all cells visible from it; both as shares of the bytes of the model with its images.
+Missed pairs are those that random segments find outside the sets.
 """
 
 from __future__ import annotations
@@ -28,6 +31,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from ptmtools.pipeline.validation import shoot_segments  # noqa: E402
+from ptmtools.site.content import Site, site_of  # noqa: E402
+from ptmtools.site.entry import link_bytes  # noqa: E402
+from ptmtools.site.files import DATA  # noqa: E402
+from ptmtools.site.publishing import weight_of  # noqa: E402
 from tests.cells.buildings import write  # noqa: E402
 from tests.cells.strangers import STRANGERS, Stranger  # noqa: E402
 
@@ -36,7 +43,7 @@ STAGES = ("scene", "cells", "pvs", "ach", "textures", "light", "emit")
 COLUMNS = (
     "model", "triangles", "", "s", "budget", " / ".join(STAGES), "MB", "cells", "expected",
     "resident", "most", "of cells", "drawn after, kB", "complete, kB", "site : model",
-    "first viewpoint", "missed",
+    "first : model", "first viewpoint", "missed",
 )  # fmt: skip
 
 
@@ -86,6 +93,8 @@ def print_row(
     scene, cells, sets, emit = (counts[stage] for stage in ("scene", "cells", "pvs", "emit"))
     visit, model = emit["visit"], scene["model_bytes"] + scene["image_bytes"]
     rooms = cells["cells"] - cells["view_only"]
+    site = site_of(database)
+    weight = weight_of(site)
     hints = json.loads((database / "www/hints.json").read_text())
     first, expected = hints["viewpoints"][0], ""
     viewpoint = first["description"]
@@ -100,10 +109,25 @@ def print_row(
         " / ".join(f"{seconds.get(stage, 0):.1f}" for stage in STAGES),
         f"{report['peak_memory'] / 1e6:,.0f}", rooms, expected,
         *(f"{sets[key]:.1%}" for key in ("mean_volume", "most_volume", "average_share")),
-        f"{drawn / 1e3:,.1f}", f"{visit['first_room'] / 1e3:,.1f}", f"{emit['bytes'] / model:.2f}",
+        f"{drawn / 1e3:,.1f}", f"{visit['first_room'] / 1e3:,.1f}",
+        f"{(weight.whole - weight.page) / model:.2f}", f"{first_room(site) / model:.2f}",
         viewpoint, len(shoot_segments(database, segments).missed),
     )  # fmt: skip
     print(f"| {' | '.join(map(str, row))} |", flush=True)
+
+
+def first_room(site: Site) -> int:
+    """Bytes until the first room is complete, with each file by itself."""
+    index, rows = site.index, site.index["cells"]
+    cell = rows[index["viewpoints"][0]["cell"]]
+    record = json.loads(site.entries[f"{DATA}/{cell['record']}"].read())
+    begin = (f"{DATA}/index-", f"{DATA}/poster-")
+    size = sum(link_bytes(e) for name, e in site.entries.items() if name.startswith(begin))
+    size += cell["recordBytes"] + sum(rows[seen]["geometryBytes"] for seen in record["visible"])
+    for texture in record["textures"][0]:
+        row = index["textures"][texture]
+        size += row["ends"][-1] + sum(p["bytes"] for p in row.get("previews", ())[-1:])
+    return int(size)
 
 
 def as_expected(position: list[float], origin: list[float], stranger: Stranger) -> bool:
