@@ -150,7 +150,8 @@ export class Visits {
    */
   async #unpack(url, index) {
     const { store } = this;
-    const bytes = new Uint8Array(await (await store.match(url))?.arrayBuffer() ?? new ArrayBuffer(0));
+    const body = (await store.match(url))?.body?.pipeThrough(new DecompressionStream("gzip"));
+    const bytes = new Uint8Array(await new Response(body).arrayBuffer());
     const { cells, textures } = await (await store.match(index))?.json();
     const length = new DataView(bytes.buffer).getUint32(0, true);
     const { parts } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
@@ -164,8 +165,7 @@ export class Visits {
         const span = { begin: 0, end: size };
         if (missingOf(await store.spans(file), span)) await store.keep(file, 0, part, row.ends.at(-1));
       } else if (!(await store.match(file))) {
-        const body = new Blob([part]).stream();
-        await store.put(file, new Response(row ? body : body.pipeThrough(new DecompressionStream("gzip"))));
+        await store.put(file, new Response(part));
       }
     }
   }
