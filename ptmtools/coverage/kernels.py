@@ -106,10 +106,10 @@ def add_crossings(points: Floats, corner: Floats, crossed: Ints) -> None:
     ray along +z crosses a (3, 3) triangle."""
     a, b, c = corner[0], corner[1], corner[2]
     low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
-    left, right, top = min(a[0], b[0], c[0]), max(a[0], b[0], c[0]), max(a[2], b[2], c[2])
-    for i in range(np.searchsorted(points[:, 0], left), len(points)):
+    west, east, top = min(a[0], b[0], c[0]), max(a[0], b[0], c[0]), max(a[2], b[2], c[2])
+    for i in range(np.searchsorted(points[:, 0], west), len(points)):
         p = points[i]
-        if p[0] > right:
+        if p[0] > east:
             break
         if not (low <= p[1] <= high) or p[2] > top:
             continue

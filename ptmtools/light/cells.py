@@ -237,10 +237,12 @@ class LightBaking:
         add(np.flatnonzero(known & (rays == 0)), 1)
         # What few rays meet, as a window far away, is missed by most of the texels around.
         for share, times in _MORE:
-            grain = grid.blur(grid.between(variance[:, None], known)[:, 0])
+            grain = grid.blur(grid.interpolate(variance[:, None], known)[:, 0])
             bright = light.mean(axis=1) + _DIM * self.building.usual
             add(np.flatnonzero(known & (grain > (share * bright) ** 2)), times)
-        light, variance = np.split(grid.between(np.column_stack([light, variance]), known), [3], 1)
+        light, variance = np.split(
+            grid.interpolate(np.column_stack([light, variance]), known), [3], 1
+        )
         # A gap narrower than a texel, all of which is covered, has the light that it has.
         light[covered & grid.is_in_chart_of(~covered)] = np.nan
         indirect = grid.smooth(light, variance[:, 0], _LEAST * self.building.usual)

@@ -116,7 +116,7 @@ class TexelGrid:
     def sparse(self) -> Bools:
         """(n,) a quarter of the texels, and those with none of these around in their chart."""
         chosen = (self.row % 2 == 0) & (self.column % 2 == 0)
-        return np.asarray(chosen | ~self._grown(np.zeros((len(chosen), 1)), chosen)[1])
+        return np.asarray(chosen | ~self._grow(np.zeros((len(chosen), 1)), chosen)[1])
 
     def uneven(
         self, light: Singles, variance: Singles, covered: Bools, known: Bools, least: float
@@ -125,15 +125,15 @@ class TexelGrid:
         their grain, `_STEEP` of their light and of ``least``."""
         mean = light.mean(axis=1)
         values = np.stack([mean, mean**2, variance, covered], axis=1)
-        mean, square, grain, hidden = self.between(values, known).T
+        mean, square, grain, hidden = self.interpolate(values, known).T
         apart = square - mean**2 > 2 * grain + (_STEEP * (mean + least)) ** 2
         return np.asarray(apart | (hidden > 0))
 
-    def between(self, light: Singles, known: Bools) -> Singles:
+    def interpolate(self, light: Singles, known: Bools) -> Singles:
         """(n, k) light, of texels that are not ``known`` the mean of the known ones around."""
-        return self._grown(light, known)[0]
+        return self._grow(light, known)[0]
 
-    def _grown(self, light: Floats | Singles, known: Bools) -> tuple[Singles, Bools]:
+    def _grow(self, light: Floats | Singles, known: Bools) -> tuple[Singles, Bools]:
         """(n, k) light grown by a texel, and (n,) of which it is known."""
         value = np.zeros((*self.chart.shape, light.shape[1]), np.float32)
         value[self.row, self.column] = np.where(known[:, None], light, 0)

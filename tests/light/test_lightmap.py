@@ -57,7 +57,7 @@ def test_even_light_is_known_from_a_quarter_of_the_texels() -> None:
     uneven = grid.uneven(light, grain, corner & known, known, 0.0)
     assert uneven[corner & ~known].all()
     assert uneven.mean() < 0.15
-    between = grid.between(light, known)
+    between = grid.interpolate(light, known)
     rest = ~(uneven | known)
     assert between[known].tolist() == light[known].tolist()
     assert between[rest] == pytest.approx(light[rest], rel=2e-2)
