@@ -73,7 +73,7 @@ CODES: dict[str, tuple[Severity, str]] = {
         "warning",
         "pixels fell on cells outside the potentially visible set (PVS): missed mass",
     ),
-    "PTM-D704": ("error", "hints.json and a texture, a GLB or a first-look bundle disagree"),
+    "PTM-D704": ("error", "hints.json and a texture or a GLB disagree"),
     "PTM-D708": ("warning", "a texture is listed in hints.json that no cell uses"),
     "PTM-D710": ("error", "a texture file, its fallback or its interlaced image is damaged"),
     "PTM-D713": TOO_LARGE,

@@ -37,7 +37,7 @@ from ptmtools.output.content import Content, EmitExtras
 from ptmtools.output.emitter import GZIP, Emitter, File
 from ptmtools.output.emitters import chosen_emitters
 from ptmtools.output.model import EmitReport, TextureRecord, VisitCost
-from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, mesh_path, path_of
+from ptmtools.output.names import HINTS, RECORD_FILES, mesh_path, path_of
 from ptmtools.output.options import EmitOptions
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.parallel import map_in_order
@@ -240,7 +240,6 @@ def emit(
         triangles=len(content.geometry.triangle),
         collapsed=content.geometry.collapsed,
         bytes=sum(sizes.values()),
-        first_look=sum(size for name, size in sizes.items() if name.endswith(BUNDLE)),
         visit=visit_of(content, sizes),
         notes=notes,
     )

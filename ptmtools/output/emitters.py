@@ -46,7 +46,7 @@ VRML = Emitter(
 )
 _HINTS = Emitter(
     name="hints",
-    about="hints.json, and a record and a first-look bundle of each cell",
+    about="hints.json, and a record of each cell",
     owns=(HINTS, f"{HINTS_FOLDER}/"),
     writer=Lazy("ptmtools.output.hints:hints_files"),
     reader=Lazy("ptmtools.output.validation.hints:read_file"),

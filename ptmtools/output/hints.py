@@ -24,10 +24,8 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.output.convexity import leaf_numbers, portal_polygons, slack_of
-from ptmtools.output.first_look import FirstLooks
 from ptmtools.output.model import PreviewRecord, TextureRecord, Viewpoint
 from ptmtools.output.names import (
-    FIRST_LOOK_FILES,
     HINTS,
     RECORD_FILES,
     STATISTICS,
@@ -42,7 +40,6 @@ if TYPE_CHECKING:
     from ptmtools.coverage.required_levels import Need
     from ptmtools.light.model import Light
     from ptmtools.output.content import Content
-    from ptmtools.output.first_look import BundlePiece
     from ptmtools.output.mesh_levels import MeshLevels
     from ptmtools.texture.model import Level
 
@@ -73,8 +70,6 @@ def index_text(content: Content) -> str:
     }
     if sets := {e.name: e.texture_files for e in emitters if e.texture_files}:
         head["textureSets"] = sets
-    if content.options.first_look:
-        head["firstLook"] = FIRST_LOOK_FILES
     if light := content.extras.light:
         head["light"] = light.display(content.options.tone)
     factors = significant(light.exposure.ravel(), NEED_DIGITS) if light else []
@@ -222,11 +217,8 @@ class RecordWriter:
         self._portals = _portals(content.cells)
         self._leaves = leaf_numbers(content.cells, slack_of(content.cells))
 
-    def record(self, cell: int, first_look: Sequence[BundlePiece] | None) -> str:
-        """The text of a cell's record; ``first_look`` is its bundle; None if the database has none.
-
-        Raises DatabaseError PTM-D601.
-        """
+    def record(self, cell: int) -> str:
+        """The text of a cell's record. Raises DatabaseError PTM-D601."""
         content = self._content
         visible = content.pvs.row(cell).tolist()
         rows = content.ach.entries(cell)
@@ -243,8 +235,6 @@ class RecordWriter:
         }
         if content.ach.by_texture:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
-        if first_look is not None:
-            head["firstLook"] = [[piece.texture, piece.level] for piece in first_look]
         if content.extras.need:
             head["need"] = self._need(content.extras.need, cell)
         leaves = [self._leaf(leaf) for leaf in content.leaves[cell]]
@@ -359,14 +349,10 @@ def hints_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
 
 
 def _files(content: Content, index: str) -> Iterator[tuple[str, str | bytes]]:
-    looks = FirstLooks(content) if content.options.first_look else None
     writer, count = RecordWriter(content), content.cells.cell_count
     for cell in range(count):
         content.extras.progress(cell, count, "hints")
-        pieces = looks.pieces(cell) if looks else None
-        yield path_of(cell, RECORD_FILES), writer.record(cell, pieces)
-        if looks and pieces:
-            yield path_of(cell, FIRST_LOOK_FILES), looks.bundle(pieces)
+        yield path_of(cell, RECORD_FILES), writer.record(cell)
     content.extras.progress(count, count, "hints")
     yield STATISTICS, statistics_text(content)
     yield HINTS, index

@@ -251,12 +251,6 @@ class WriterOptions:
         "0.8 of white, as pictures want) or agx (softer contrast, as film; bright colours pale). "
         "Without effect on light of the model, and without light.",
     )
-    first_look: int = option(
-        0,
-        "For each cell, also write one file that holds the levels up to this width and height of "
-        "all textures visible from the cell; 0 writes none.",
-        metavar="TEXELS",
-    )
     need: int = option(
         16,
         "Number of sample points per cell for measuring the required resolution of each texture; "
@@ -278,8 +272,6 @@ class WriterOptions:
             fault = "the sizes of --avatar-size must be 0 or more"
         elif self.viewpoint_count < 0:
             fault = f"--viewpoint-count {self.viewpoint_count} is below 0"
-        elif self.first_look < 0:
-            fault = f"--first-look {self.first_look} is below 0"
         elif self.gltf_step is not None and not 0 < self.gltf_step < math.inf:
             fault = f"--gltf-step {self.gltf_step:g} m is not above 0"
         elif self.need < 0:
@@ -341,7 +333,6 @@ class EmitReport:
     shapes, triangles: written, over all cells; a piece in a boundary counts once per cell.
     collapsed: pieces left out because two corners are one after rounding to float32.
     bytes: of all files together.
-    first_look: of these, bytes of first-look bundles.
     visit: the cost of a visit.
     notes: remarks, one line each.
     """
@@ -352,7 +343,6 @@ class EmitReport:
     triangles: int
     collapsed: int
     bytes: int
-    first_look: int
     visit: VisitCost
     notes: tuple[str, ...] = ()
 

@@ -24,8 +24,6 @@ GLTF_FOLDER = "gltf"
 UP = "../"
 #: The files of a cell, as the index names them: URI templates (RFC 6570, level 1).
 RECORD_FILES = f"{HINTS_FOLDER}/{{name}}.json"
-BUNDLE = ".bin"
-FIRST_LOOK_FILES = f"{HINTS_FOLDER}/{{name}}{BUNDLE}"
 VRML_FILES = f"{CELL_FOLDER}/{{name}}.wrl"
 GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
 

@@ -43,7 +43,7 @@ JSON, JPEG = "application/json", "image/jpeg"
 GLB, PTM = "model/gltf-binary", "application/octet-stream"
 OPENING = "application/octet-stream"
 #: Fields of a database's index that a site's index lacks.
-_LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook")
+_LEFT_OUT = ("record", "geometry", "textureSets", "statistics")
 _IMAGE_MEDIA = {format.suffix: format.media for format in FORMATS.values()}
 _VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"} | _IMAGE_MEDIA
 #: Largest poster, as a share of the site: a building of few bytes is there as soon as its picture.

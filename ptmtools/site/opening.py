@@ -6,11 +6,10 @@ The page fetches the opening with its program, so that both are there after two 
 previews stay files of their own, which the page requests in the order of the opening's list: their
 bytes are not published twice, and a request costs little beside them.
 
-An opening is of a *view*, a viewpoint on a screen of 16:9. (Bundles by cell, which hold the coarse
-levels of all that may be seen from it, bring nothing to the client: docs/formats/hints.md, First
-look.) The first viewpoint has one, and those after it as long as the openings repeat little of the
-site: links lead to these. The order is that of the client (docs/formats/client.md): the
-worth of a step by the pixels that need it, per byte.
+An opening is of a *view*, a viewpoint on a screen of 16:9. (Files by cell with the coarse levels of
+all that may be seen from it bring nothing to the client.) The first viewpoint has one, and those
+after it as long as the openings repeat little of the site: links lead to these. The order is that
+of the client (docs/formats/client.md): the worth of a step by the pixels that need it, per byte.
 
 A site no larger than `WHOLE` has one opening, with the records, geometry and small textures of all
 cells after what its view needs: those of a small building take half the bytes in one gzip stream,

@@ -25,7 +25,7 @@ from ptmtools.scene.colors import to_srgb
 from ptmtools.texture import read_header
 from ptmtools.tolerance import PARALLEL_COSINE
 from tests.output.relations import relations, root_file
-from tests.output.texture_agreement import bundles, materials, octrees, textures
+from tests.output.texture_agreement import materials, octrees, textures
 from tests.output.vrml_checks import vrml_faults
 from tests.output.vrml_reader import VrmlDocument, VrmlNode, parse
 
@@ -69,7 +69,6 @@ def disagreements(www: Path) -> list[str]:
         lines += _cells(records, index, cells)
         lines += relations(index, records, statistics, _extent(www))
         lines += textures(www, index, statistics)
-        lines += bundles(www, index, records)
         lines += octrees(www, index, glbs)
         for name, glb in glbs.items():
             lines += materials(name, glb, index)

@@ -162,7 +162,7 @@ def finished(artifacts: Artifacts, tmp_path_factory: pytest.TempPathFactory) -> 
         a.ach,
         records,
         db / "www",
-        EmitOptions(format="vrml", first_look=8),
+        EmitOptions(format="vrml"),
     )
     write_manifest(db)
     return db

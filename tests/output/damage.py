@@ -28,7 +28,6 @@ KINDS = {
     "index": ("D700", "record|textures|in the index|names (no|files of another) form"),
     "needs": ("D700", "has only"),
     "octree_row": ("D700", "ascending|more than an octree|not aligned"),
-    "first_look": ("D704", "bundle|does not refine"),
     "glb_texture": ("D704", r"texture -?\d+$"),
     "fallback_differs": ("D710", "is not the size of any level"),
     "fallback_unreadable": ("D710", "is not a PNG|cannot be read"),

@@ -127,8 +127,8 @@ def _shares(record: Any, baked: Sequence[set[int]]) -> str:
     numbers = [row[0] for row in record.get("need", ())]
     if numbers != sorted(set(numbers)):
         return "the textures of the need are not in ascending order"
-    if not visible >= {*numbers, *(texture for texture, _ in record.get("firstLook", ()))}:
-        return "a texture of the need or the bundle is not visible"
+    if not visible >= {*numbers}:
+        return "a texture of the need is not visible"
     needs = {row[0]: row[2:] for row in record.get("need", ())}
     if any(list(shares) != sorted(shares, reverse=True) for shares in needs.values()):
         return "the need of a texture increases"

@@ -58,12 +58,12 @@ def test_a_toy_emitter(
     artifacts, tmp_path: Path, put_textures, seal: Callable[[Path], None], format: str
 ) -> None:
     a, db = artifacts, tmp_path / "db"
-    records, options = put_textures(db / "www"), EmitOptions(format=format, first_look=8)
+    records, options = put_textures(db / "www"), EmitOptions(format=format)
     report = emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", options)
     ours = ("toys/0.txt", "toys/1.txt", "toys/2.txt", "toy.txt")
-    cells = [f"hints/c000{cell}.{kind}" for cell in range(3) for kind in ("json", "bin")]
+    cells = [f"hints/c000{cell}.json" for cell in range(3)]
     hints = (*cells, "hints/statistics.json", "hints.json")
-    assert report.files[-12:] == (*ours, *hints), "the hints are always written"
+    assert report.files[-9:] == (*ours, *hints), "the hints are always written"
     assert ("root.wrl" in report.files) is ("vrml" in format)
     assert ("gltf/c0000.glb" in report.files) is ("gltf" in format)
     with pytest.raises(OutputError, match="PTM-O001"):
@@ -115,7 +115,7 @@ def test_both_by_default_and_each_alone(artifacts, tmp_path: Path, put_textures)
     a, records = artifacts, put_textures(tmp_path)
     assert EmitOptions().format == "vrml,gltf"
     for format in ("vrml,gltf", "vrml", "gltf"):
-        options = EmitOptions(format=format, first_look=8)
+        options = EmitOptions(format=format)
         report = emit(a.scene, a.cells, a.pvs, a.ach, records, tmp_path / format, options)
         assert ("root.wrl" in report.files) is ("vrml" in format)
         assert ("gltf/c0000.glb" in report.files) is ("gltf" in format)

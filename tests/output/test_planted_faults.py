@@ -59,7 +59,7 @@ from tests.output.faults import (
 #: Kinds of differences between files (`tests.output.agreement`).
 DIFFERENCES = frozenset(
     ["cell", "viewpoint", "root", "relation", "openings", "overlap"]
-    + ["shares", "statistics", "texture", "bundle", "box", "leaves", "portals", "viewpoint_place"]
+    + ["shares", "statistics", "texture", "box", "leaves", "portals", "viewpoint_place"]
     + ["vrml", "not_finite", "lacks", "coord_index", "tex_coord_index", "colour"]
     + ["hull", "outside_hull", "leaf_start", "ach_length"]
 )
@@ -248,7 +248,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=99))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=None))),
     ("D704 texture", coarser(1)),
-    ("bundle texture", recoded(lambda texels: texels[:, ::-1])),
+    ("texture", recoded(lambda texels: texels[:, ::-1])),
     ("openings", cell(1, lambda c: c["portals"].pop())),
     ("openings", portal(lambda row: row.update(area=99.0))),
     ("portals", portal(lambda row: moved(row, 0, 0, 0.1))),
@@ -280,7 +280,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D710", flipped),
     ("D710 texture", appended(A, b"x")),
     ("D710 texture", rewritten(A, lambda data: data[:-1])),
-    ("D710 bundle", put(A, b"")),
+    ("D710", put(A, b"")),
     ("texture", repainted),
     (
         "fallback_differs texture",
@@ -311,17 +311,6 @@ FAULTS: list[tuple[str, Damage]] = [
         for name in (HINTS, R0, STATISTICS)
     ),
     ("other_schema", hinted(lambda d: d.update(schema=4, cells="of another kind"))),
-    ("first_look", hinted(lambda d: d.pop("firstLook"))),
-    ("first_look", cell(0, lambda c: c.pop("firstLook"))),
-    ("first_look bundle", cell(0, lambda c: c["firstLook"].pop())),
-    ("bundle", cell(0, lambda c: c["firstLook"].reverse())),
-    ("first_look", cell(0, lambda c: c["firstLook"].append(c["firstLook"][-1]))),
-    ("first_look", cell(0, lambda c: c["firstLook"][0].__setitem__(1, 99))),
-    ("D700 shares", cell(0, lambda c: c["firstLook"][0].__setitem__(0, 2))),
-    ("first_look bundle", rewritten("hints/c0001.bin", lambda data: data[:-1])),
-    ("first_look bundle", appended("hints/c0001.bin", b"x")),
-    ("bundle", rewritten("hints/c0001.bin", lambda data: data[:9] + b"x" + data[10:])),
-    ("no_file", removed("hints/c0001.bin")),
     ("shares", needed([[1, 0, 0.2], [0, 0, 0.3]])),
     ("shares", needed([[0, 0, 0.2], [0, 0, 0.3]])),
     ("needs", needed([[0, 3, 0.2, 0.1, 0.1]])),

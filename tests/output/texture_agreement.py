@@ -124,22 +124,6 @@ def _set(folder: Path, row: Mapping[str, Any], finest: Any, kind: Any) -> str:
     return ""
 
 
-def bundles(www: Path, index: Any, records: Mapping[str, Any]) -> Iterator[str]:
-    """The first-look bundles that do not consist of the bytes of the textures."""
-    template = index.get("firstLook")
-    for name, record in records.items() if template else ():
-        with suppress(OSError, KeyError, IndexError, TypeError):
-            data, reached = b"", dict[int, int]()
-            for texture, level in record["firstLook"]:
-                row = index["textures"][texture]
-                start = row["ends"][reached[texture]] if texture in reached else 0
-                data += (www / unquote(row["file"])).read_bytes()[start : row["ends"][level]]
-                reached[texture] = level
-            path = www / template.replace("{name}", name)
-            if (path.read_bytes() if data else b"") != data:
-                yield f"bundle: {name}"
-
-
 # GLBs and hints
 
 

@@ -199,7 +199,7 @@ def test_two_machines_alternate(
 ) -> None:
     """The copy of one has older textures than the URL."""
     few_in_lists(monkeypatch)
-    url, looks = f"s3://{bucket}/db", EmitOptions(first_look=16)
+    url, others = f"s3://{bucket}/db", EmitOptions(format="vrml,interlace")
     one, other = machine(), machine()
 
     def build(at: Path, *options: Any) -> None:
@@ -211,9 +211,9 @@ def test_two_machines_alternate(
     build(other)
     painted(rooms, "room_a.png", 160)
     build(one)
-    build(one, looks)
+    build(one, others)
     machine()
-    assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST, looks)
+    assert files_below(fetch_database(url)) == built_here(rooms, tmp_path / "here", FAST, others)
 
 
 def test_local_processes_encode_images_of_the_url(
@@ -239,7 +239,7 @@ def test_later_stages_read_what_they_need(
     machine()
     store.requests.clear()
     (rooms.parent / "floor.png").write_bytes(png_bytes(np.zeros((8, 8, 3), np.uint8)))
-    options = EmitOptions(format="vrml,gltf,interlace", first_look=16)
+    options = EmitOptions(format="vrml,gltf,interlace")
     build_scene(rooms, url, EMBREE, DIM, FAST, options, workers=1)
     outputs = manifest_of(store, bucket, "db").outputs()
     read = {r.path.rpartition("/")[2] for r in store.requests if r.method == "GET"}

@@ -13,7 +13,7 @@ from ptmtools.diagnostics import Place
 from ptmtools.output.hints import RECORD_FORMAT as FORMAT, SCHEMA
 from ptmtools.output.mesh_levels import row_fault
 from ptmtools.output.model import FileError, convert_shape_errors, probe_fault, sizes_of
-from ptmtools.output.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS
+from ptmtools.output.names import HINTS, HINTS_FOLDER, STATISTICS
 from ptmtools.output.representation import representations_in
 from ptmtools.output.validation.files import ReadHints, Row, ServedDatabase
 from ptmtools.output.validation.textures import check_record
@@ -24,8 +24,8 @@ _ACH_SLACK = 1e-9
 _MISSED = 1e-4
 
 
-def read_file(path: str, data: bytes) -> Row | int | None:
-    """The index, a record or the statistics; the length of a bundle; None of other files.
+def read_file(path: str, data: bytes) -> Row | None:
+    """The index, a record or the statistics; None of other files.
 
     Raises FileError: PTM-D656 of another schema; PTM-D700 not valid against the schema.
     """
@@ -34,8 +34,6 @@ def read_file(path: str, data: bytes) -> Row | int | None:
         for i, view in enumerate(index["viewpoints"]):
             _in_range([view["cell"]], len(index["cells"]), f"viewpoints[{i}].cell")
         return index
-    if path.endswith(BUNDLE):
-        return len(data)
     if not path.startswith(f"{HINTS_FOLDER}/") or not path.endswith(".json"):
         return None
     return _read(data, schemas.STATISTICS if path == STATISTICS else schemas.CELL)
@@ -75,7 +73,7 @@ def gather(database: ServedDatabase) -> ReadHints | None:
 
 
 def check_files(database: ServedDatabase) -> None:
-    """Checks the records, the textures, the first-look bundles and the viewpoints."""
+    """Checks the records, the textures and the viewpoints."""
     hints = database.hints
     if hints is None:
         return
@@ -89,7 +87,6 @@ def check_files(database: ServedDatabase) -> None:
         if row["missed"] > _MISSED:
             message = f"{row['missed']:.3g} of the pixels fell on cells outside the PVS"
             database.place(STATISTICS, f"cells[{i}]").add("PTM-D703", message)
-    _check_first_looks(hints, database)
     for kind in representations_in(hints.index):
         kind.check.load()(hints, database)
     _check_meshes(index, at)
@@ -136,8 +133,7 @@ def _record_fault(record: Any, i: int, cells: Sequence[Row], textures: int) -> F
             _in_range(row, textures, f"textures[{k}]")
         for k, shares in enumerate(record.get("textureShares", ())):
             _in_range([t for t, _ in shares if t is not None], textures, f"textureShares[{k}]")
-        for name in ("firstLook", "need"):
-            _in_range([row[0] for row in record.get(name, ())], textures, name)
+        _in_range([row[0] for row in record.get("need", ())], textures, "need")
     except FileError as fault:
         return fault
     return None
@@ -187,29 +183,3 @@ def _check_textures(hints: ReadHints, database: ServedDatabase) -> None:
         fallback, *previews = (database.contents.get(image or "") for image in images)
         if header := database.contents.get(file or ""):
             check_record(row, header, fallback, previews, at)
-
-
-def _check_first_looks(hints: ReadHints, database: ServedDatabase) -> None:
-    """Compares the length of each bundle with the levels that its record lists."""
-    template: str | None = hints.index.get("firstLook")
-    urls = hints.cell_urls(template) if template else []
-    ends = [[0, *row["ends"]] for row in hints.index["textures"]]
-    for i, record in hints.usable_records():
-        at = database.place(hints.paths[i], "firstLook")
-        if (template is None) != ("firstLook" not in record):
-            at.add("PTM-D704", "only one of the index and the record names a bundle")
-            continue
-        reached: dict[int, int] = {}
-        for texture, level in record.get("firstLook", ()):
-            before = reached.get(texture, -1)
-            if not before < level < len(ends[texture]) - 1:
-                at.add("PTM-D704", "a pair does not refine its texture")
-                break
-            reached[texture] = level
-        else:
-            length = sum(ends[texture][level + 1] for texture, level in reached.items())
-            if length and (path := database.resolve(HINTS, urls[i])):
-                actual = database.contents.get(path, length)
-                if actual != length:
-                    message = f"the bundle has {actual} bytes, its levels {length}"
-                    database.place(path).add("PTM-D704", message)

@@ -141,7 +141,7 @@ class EmitStage(Stage[None]):
         "portals that door leaves cover are marked as passages; GLBs are compressed; the "
         "hints hold the previews of textures, the errors and the "
         "effect of each texture level, mean colours, GPU sizes of texels, and the resolution "
-        "needed in each cell; --first-look writes a bundle of coarse levels for each cell; "
+        "needed in each cell; "
         "viewpoints face pictures; hulls with slivers and portals with short edges are convex in "
         "float32 and float64; objects with thousands of triangles have levels of detail"
     )
@@ -192,7 +192,6 @@ class EmitStage(Stage[None]):
         counts = {
             "files": len(report.files),
             "bytes": report.bytes,
-            "first_look": report.first_look,
             "shapes": report.shapes,
             "triangles": report.triangles,
             "visible": run[CELLS].visible,
@@ -204,10 +203,8 @@ class EmitStage(Stage[None]):
         return complete(work, counts, report.notes)
 
     def summary(self, n: Counts) -> str:
-        looks = n.get("first_look")
-        bundles = f" ({size(looks)} of first-look bundles)" if looks else ""
         return (
-            f"{count(n['files'], 'file')}, {size(n['bytes'])}{bundles}; "
+            f"{count(n['files'], 'file')}, {size(n['bytes'])}; "
             f"{count(n['triangles'], 'triangle')} in all cells, from {n['visible']:,} of the model "
             f"({n['owners']:,} if none were cut at cell boundaries), "
             f"{count(n['viewpoints'], 'viewpoint')}"
