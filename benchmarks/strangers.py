@@ -12,8 +12,8 @@ the peak. Resident is the share of the volume, its mean over places and its maxi
 Kilobytes are those of the database until the first room is drawn, and until it has all objects as
 modelled. *Site* is what a visitor downloads in a walk through all rooms, without the page, which is
 the same for all (`ptm publish`); *first* is the index, the poster, and the first room with the
-geometry of all cells visible from it; both as shares of the bytes of the model with its images.
-Missed pairs are those that random segments find outside the sets.
+geometry of all cells visible from it, each file requested by itself; both as shares of the bytes of
+the model with its images. Missed pairs are those that random segments find outside the sets.
 """
 
 from __future__ import annotations

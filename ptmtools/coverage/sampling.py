@@ -156,8 +156,8 @@ class HintSampler:
     ) -> None:
         self.scene, self.cells, self.pvs = scene, cells, pvs
         self.options, self.backend = options, backend
-        self._obstacles = SampleObstacles.from_scene(scene, cells)
         self._volumes = CellVolume.of_cells(cells)
+        self._obstacles = SampleObstacles.from_scene(scene, cells, self._volumes)
         self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
         surfaces = ItemSurfaces.from_scene(scene, cells)
         self.renderer = backend.open(surfaces, options.side, options.gpu)

@@ -6,7 +6,7 @@
 and grouped by shared edges; a group is a *solid* if it is closed (every edge is used an even number
 of times, so that the parity of the crossings along a ray does not depend on the ray), unless
 
-- most of its area lies in cell boundaries, or most of the places in a cell are inside: then it is
+- most of its area lies in cell boundaries, or nearly all places in a cell are inside: then it is
   structure, and the subdivision has already decided what lies behind it (the mesh of a whole
   building is often one group), or
 - its faces consistently point inwards: a shell that is meant to be seen from within.
@@ -17,6 +17,7 @@ winding number (wrong wherever faces are oriented at random, as in most OBJ file
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,8 +35,9 @@ from ptmtools.scene.model import Scene
 DIRECTIONS = np.array([[0.683, 0.577, 0.448], [-0.371, 0.819, -0.437], [0.291, -0.463, -0.837]])
 
 
-#: Places in each cell that tell whether it is within a solid.
-_TESTS = 16
+#: Places in a cell that tell whether it is within a solid, and the share of them inside: another
+#: solid may hold the rest.
+_TESTS, _MOST = 16, 0.75
 
 
 def _frames() -> Floats:
@@ -129,24 +131,22 @@ class SampleObstacles:
     solids: tuple[Floats, ...]  # (n, 3, 3) corners of each closed one with an inside
 
     @staticmethod
-    def from_scene(scene: Scene, cells: Cells) -> SampleObstacles:
-        """The obstacles of a subdivided scene."""
-        corners = scene.corners
-        obstacles = SampleObstacles(corners, Nearby(corners, 0.0), tuple(solids(scene, cells)))
-        volumes = CellVolume.of_cells(cells)
-        points = [volume.sobol(0, _TESTS, 0)[:, :3] for volume in volumes]
-        cell = np.repeat(np.arange(len(points)), [len(some) for some in points])
-        tests = np.concatenate([np.zeros((0, 3)), *points])
+    def from_scene(
+        scene: Scene, cells: Cells, volumes: Sequence[CellVolume] | None = None
+    ) -> SampleObstacles:
+        """The obstacles of a subdivided scene; ``volumes`` are those of its cells."""
+        corners, rest = scene.corners, tuple(solids(scene, cells))
+        places = [
+            v.sobol(0, 4 * _TESTS, 0)[:_TESTS, :3] for v in volumes or CellVolume.of_cells(cells)
+        ]
+        tests = [points for points in places if len(points) == _TESTS]
         while True:
-            owner = obstacles.solid_of(tests)
-            pair, count = np.unique(
-                np.stack([owner, cell], axis=1)[owner >= 0], axis=0, return_counts=True
-            )
-            rooms = set(pair[2 * count > np.bincount(cell)[pair[:, 1]], 0].tolist())
-            if not rooms:
+            obstacles = SampleObstacles(corners, Nearby(corners, 0.0), rest)
+            owners = [np.unique(obstacles.solid_of(t), return_counts=True) for t in tests]
+            shells = {n for o, count in owners for n in o[count >= _MOST * _TESTS] if n >= 0}
+            if not shells:
                 return obstacles
-            rest = tuple(body for n, body in enumerate(obstacles.solids) if n not in rooms)
-            obstacles = SampleObstacles(corners, obstacles.nearby, rest)
+            rest = tuple(body for n, body in enumerate(rest) if n not in shells)
 
     def in_solid(self, points: Floats) -> Bools:
         """(n,) whether each of the (n, 3) points is inside a solid."""

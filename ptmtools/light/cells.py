@@ -78,8 +78,7 @@ _PADDING = 1
 #: By default, lightmaps are to have at most this share of the bytes of the model's images, or this
 #: number of bytes, whichever is more. They have fewer texels to the metre if necessary.
 SHARE, BYTES = 0.1, 400_000
-#: Beside a small model the number is less: this, its images, and so many for each triangle, as many
-#: as a file has of it.
+#: Beside a small model it is less: this, the images, and this for each triangle, as in a file.
 LEAST, TRIANGLE = 16_000, 24
 #: Texels of the smallest lightmap: a building with fewer shows no light, but is of another scale.
 _SMALLEST = 16**2
@@ -351,6 +350,7 @@ def affordable_density(pieces: Sequence[CellSurfaces], density: float, images: i
     cost = expected_bytes(pieces, density)
     if cost < _SMALLEST * _TEXEL_BYTES:
         return 0.0
-    model = LEAST + images + TRIANGLE * sum(len(surfaces.corner) for surfaces in pieces)
+    faces = np.unique(np.concatenate([surfaces.face for surfaces in pieces]))
+    model = LEAST + images + TRIANGLE * len(faces)
     reached = density * min(1.0, math.sqrt(max(SHARE * images, min(BYTES, model)) / cost))
     return reached if reached >= RANGES["light_density"][0] else 0.0

@@ -79,6 +79,14 @@ def test_structure_is_the_subdivisions_business(room_row, furnish):
     assert SampleObstacles.from_scene(turned, loose).solids == ()
 
 
+def test_a_block_that_fills_half_of_a_room_is_a_solid(room_row, furnish):
+    """Half of the places in the room are inside."""
+    _, cells = room_row(1)
+    (x, _, z), (right, top, back) = cells.vertex.min(axis=0), cells.vertex.max(axis=0)
+    block = box([x + 0.1, 0.1, z + 0.1], [x + 0.6 * (right - x), top - 0.1, back - 0.1])
+    assert len(around(room_row, furnish, block).solids) == 1
+
+
 def test_open_and_thin_things_have_no_inside(room_row, furnish):
     sheet = [STATUE[0]]
     no_lid = [q for i, q in enumerate(STATUE) if i != 3]

@@ -271,7 +271,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("statistics", counted(2, lambda c: c["views"][3].__setitem__(0, 0.5))),
     ("shares", textured([[[0, 0.5]]] * 3)),
     ("record_ach", textured([[[0, 0.8]], [[0, 0.1]]])),
-    ("D708 shares", unused),
+    ("D708", unused),
     ("leaves box cell", cell(1, lambda c: c["leaves"][0]["points"][0].__setitem__(1, -1.0))),
     ("leaves", cell(1, lambda c: c["leaves"][0]["faces"].pop())),
     ("leaves", cell(1, lambda c: c["leaves"][0]["faces"][0].reverse())),

@@ -44,7 +44,7 @@ def test_a_good_database_has_no_issue(finished: Path) -> None:
     assert report.issues == ()
     assert disagreements(finished / "www") == []
     assert report.ok
-    assert report.files == 16
+    assert report.files == 13
     assert report.bytes == sum(
         p.stat().st_size for p in (finished / "www").rglob("*") if p.is_file()
     )

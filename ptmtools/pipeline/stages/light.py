@@ -346,7 +346,7 @@ class LightStage(Stage["Light"]):
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
     recipe = 15
-    changed = "white is balanced for bright light; coloured glass colours what passes"
+    changed = "small models have smaller lightmaps; even light takes fewer rays"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
