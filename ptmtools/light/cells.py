@@ -41,8 +41,7 @@ if TYPE_CHECKING:
 _AT_VERTICES = 0.125
 #: The least light of the model's own lightmaps.
 _PAINTED = 0.15
-#: A quarter of the texels, and those between uneven ones, have this share of the rays at first; the
-#: others have the mean of those around.
+#: Each texel has this share of the rays of the options at first.
 _FIRST = 0.5
 #: Texels among whose neighbours the deviation is more than this share of their light, beside
 #: `_DIM` of the usual light, have this multiple of the first rays more, turned by `_AGAIN` of a
@@ -218,33 +217,22 @@ class LightBaking:
         # Of one ray no variance is known.
         first = max(2, math.ceil(self.options.light_samples * _FIRST))
         lit = self.building.look(corner[rows], side[rows], first, near)
-        light, rays = np.zeros((len(point), 3), np.float32), np.zeros(len(point), np.float32)
-        variance, covered = np.zeros_like(rays), np.zeros(len(point), np.bool_)
-
-        def add(texels: Ints, times: int) -> None:
-            shift = (turn[texels] + rays[texels] * _AGAIN) % 1.0
-            more, grain, hidden = lit.indirect(grid.face[texels], point[texels], shift, times)
-            rays[texels] += times
-            share = times / rays[texels]
-            light[texels] += share[:, None] * (more - light[texels])
-            covered[texels] = np.where(share < 1, covered[texels], hidden)
-            variance[texels] = grain * share
-
-        known = grid.sparse()
-        add(np.flatnonzero(known), 1)
-        known |= grid.uneven(light, variance, covered, known, _DIM * self.building.usual)
-        add(np.flatnonzero(known & (rays == 0)), 1)
+        light, variance, covered = lit.indirect(grid.face, point, turn)
         # What few rays meet, as a window far away, is missed by most of the texels around.
-        for share, times in _MORE:
-            grain = grid.blur(grid.interpolate(variance[:, None], known)[:, 0])
+        rays = np.ones(len(light), np.float32)
+        for grain, times in _MORE:
             bright = light.mean(axis=1) + _DIM * self.building.usual
-            add(np.flatnonzero(known & (grain > (share * bright) ** 2)), times)
-        light, variance = np.split(
-            grid.interpolate(np.column_stack([light, variance]), known), [3], 1
-        )
+            grainy = np.flatnonzero(grid.blur(variance) > (grain * bright) ** 2)
+            more, rest, _ = lit.indirect(
+                grid.face[grainy], point[grainy], (turn[grainy] + times * _AGAIN) % 1.0, times
+            )
+            rays[grainy] += times
+            share = times / rays[grainy]
+            light[grainy] += share[:, None] * (more - light[grainy])
+            variance[grainy] = rest * share
         # A gap narrower than a texel, all of which is covered, has the light that it has.
         light[covered & grid.is_in_chart_of(~covered)] = np.nan
-        indirect = grid.smooth(light, variance[:, 0], _LEAST * self.building.usual)
+        indirect = grid.smooth(light, variance, _LEAST * self.building.usual)
         return np.asarray(indirect + lit.direct(grid.face, point, turn), np.float32)
 
     def _look(

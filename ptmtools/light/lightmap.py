@@ -33,8 +33,6 @@ from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 _STEPS, _APART = (1, 2, 4, 8), 3.0
 #: Texels by which what is open grows into what is covered: beyond, the light of other rooms counts.
 _GROWN = 2
-#: Light between texels whose deviation is a larger share of it is not their mean.
-_STEEP = 0.05
 #: Weights of texels at a distance of 0, 1 and 2 steps.
 _SPLINE = np.array([3 / 8, 1 / 4, 1 / 16], np.float32)
 
@@ -112,35 +110,6 @@ class TexelGrid:
         grain = np.zeros(self.chart.shape, np.float32)
         grain[self.row, self.column] = variance
         return blur(grain, self.chart)[self.row, self.column]
-
-    def sparse(self) -> Bools:
-        """(n,) a quarter of the texels, and those with none of these around in their chart."""
-        chosen = (self.row % 2 == 0) & (self.column % 2 == 0)
-        return np.asarray(chosen | ~self._grow(np.zeros((len(chosen), 1)), chosen)[1])
-
-    def uneven(
-        self, light: Singles, variance: Singles, covered: Bools, known: Bools, least: float
-    ) -> Bools:
-        """(n,) texels beside ``known`` ones that something covers, or that are apart by more than
-        their grain, `_STEEP` of their light and of ``least``."""
-        mean = light.mean(axis=1)
-        values = np.stack([mean, mean**2, variance, covered], axis=1)
-        mean, square, grain, hidden = self.interpolate(values, known).T
-        apart = square - mean**2 > 2 * grain + (_STEEP * (mean + least)) ** 2
-        return np.asarray(apart | (hidden > 0))
-
-    def interpolate(self, light: Singles, known: Bools) -> Singles:
-        """(n, k) light, of texels that are not ``known`` the mean of the known ones around."""
-        return self._grow(light, known)[0]
-
-    def _grow(self, light: Floats | Singles, known: Bools) -> tuple[Singles, Bools]:
-        """(n, k) light grown by a texel, and (n,) of which it is known."""
-        value = np.zeros((*self.chart.shape, light.shape[1]), np.float32)
-        value[self.row, self.column] = np.where(known[:, None], light, 0)
-        grid = np.zeros(self.chart.shape, np.bool_)
-        grid[self.row, self.column] = known
-        value, grid = grow(value, grid, self.chart)
-        return value[self.row, self.column], grid[self.row, self.column]
 
     def fill(self, light: Singles) -> Singles:
         """(size, size, k) the lightmap of (n, k) light, of which covered texels have NaN."""

@@ -43,27 +43,6 @@ def test_grain_is_smoothed_and_edges_of_light_stay() -> None:
     assert smooth[~left].mean() == pytest.approx(wanted[~left].mean(), rel=0.03)
 
 
-def test_even_light_is_known_from_a_quarter_of_the_texels() -> None:
-    """A slope, an edge across it, and something that covers a corner."""
-    grid = grid_of(GROUND)
-    point = grid.points()[:, [0, 2]] - GROUND[..., [0, 2]].mean()
-    known = grid.sparse()
-    assert 0.25 < known.mean() < 0.3
-    corner = (np.abs(point - 2) < 1).all(axis=1)
-    slope = np.where(point[:, :1] < 0.3, 1.0, 2.0) + 0.02 * point
-    light = np.repeat(slope[:, :1], 3, axis=1).astype(np.float32)
-    light[corner & ~known] = 9.0
-    grain = np.full(len(light), 1e-4, np.float32)
-    uneven = grid.uneven(light, grain, corner & known, known, 0.0)
-    assert uneven[corner & ~known].all()
-    assert uneven.mean() < 0.15
-    between = grid.interpolate(light, known)
-    rest = ~(uneven | known)
-    assert between[known].tolist() == light[known].tolist()
-    assert between[rest] == pytest.approx(light[rest], rel=2e-2)
-    assert not grid.uneven(light, grain + 1, corner & False, known, 0.0).any()
-
-
 def test_covered_texels_take_what_is_open_and_give_nothing() -> None:
     grid = grid_of(GROUND)
     light = np.ones((len(grid.face), 1), np.float32)

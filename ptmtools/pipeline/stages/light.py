@@ -346,7 +346,7 @@ class LightStage(Stage["Light"]):
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
     recipe = 15
-    changed = "small models have smaller lightmaps; even light takes fewer rays"
+    changed = "small models have smaller lightmaps"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
