@@ -24,9 +24,11 @@ from ptmtools.cli.main import main  # noqa: E402
 from ptmtools.output.served import read_served  # noqa: E402
 from ptmtools.rendering.drawing import ViewOptions, draw_view  # noqa: E402
 from ptmtools.site.content import SiteOptions, site_of  # noqa: E402
+from ptmtools.site.conversion import lean_glb  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
 from tests.site.mirrors import mirror_site, mirrors_of  # noqa: E402
 from tests.site.strips import EXPOSURE, EYES, lit_site, view_of  # noqa: E402
+from tests.site.test_geometry import painted_glb  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
 
 #: What MeshBasicMaterial shows before a background of nothing.
@@ -366,6 +368,38 @@ def test_three_js_follows_the_formula_of_light(
     before, *_, soon, late, after = answer["exposures"]
     assert (before, late, after) == (more, less, more)
     assert all(least <= part < most for least, part, most in zip(less, soon, more, strict=True))
+
+
+PAINTED = """
+const { CellLoader } = await import("three-ptm");
+const answer = [];
+for (const name of ["whole", "lean"]) {
+  const shapes = [], materials = new Set(), paints = new Set();
+  (await new CellLoader().load(`/www/${name}.glb`)).traverse(({ geometry, material }) => {
+    if (!geometry) return;
+    const { attributes: { position, color, ...others }, index } = geometry;
+    const paint = color && [color.array.constructor.name, color.itemSize, color.normalized];
+    const numbers = [position, index, ...(color ? [color] : [])].map(({ array }) => [...array]);
+    shapes.push([material.vertexColors, paint, Object.keys(others), numbers]);
+    materials.add(material);
+    paints.add(color);
+  });
+  answer.push({ shapes, materials: materials.size, paints: paints.size });
+}
+return answer;
+"""
+
+
+def test_three_js_reads_the_colours_of_a_site(three: Any, tmp_path: Path) -> None:
+    """As GLTFLoader reads those of the database; shapes of one look share material and colours."""
+    whole, _ = painted_glb()
+    for name, data in (("whole", whole), ("lean", lean_glb(whole))):
+        (tmp_path / f"{name}.glb").write_bytes(data)
+    (before, after), visit = three.run(PAINTED, {"www": tmp_path})
+    assert visit.messages == []
+    assert sorted(before["shapes"], key=str) == sorted(after["shapes"], key=str)
+    assert sorted(painted for painted, *_ in after["shapes"]) == [False, True, True]
+    assert (after["materials"], after["paints"]) == (2, 2), "painted and white"
 
 
 MIRRORS = """

@@ -1,7 +1,7 @@
 // Cells from their GLBs, as docs/formats/gltf.md describes them: with the textures and the light of this
 // adapter, or unlit. Only what has a normal map is lit by a lamp.
 
-import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
+import { BufferAttribute, ClampToEdgeWrapping, Color, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 import { loadViewDecoder } from "ptm-decoder";
@@ -44,6 +44,20 @@ const meshoptDecoder = {
   },
 };
 
+/** Linear light of sRGB codes, of 65535. */
+const LINEAR = Array.from({ length: 256 }, (_, code) =>
+  Math.round(65535 * new Color(code / 255, 0, 0).convertSRGBToLinear().r));
+
+/**
+ * What GLTFLoader makes of `COLOR_0`, from the codes that published sites have in its place.
+ * @param {BufferAttribute} codes red − green, green, blue − green, modulo 256, and 0
+ */
+function colorsOf({ array }) {
+  const colors = new Uint16Array(array).map((code, k) =>
+    k % 4 > 2 ? 65535 : LINEAR[k % 4 === 1 ? code : (code + array[k - k % 4 + 1]) & 255]);
+  return new BufferAttribute(colors, 4, true);
+}
+
 /** Loads no images: the plug-ins with these names take the place of its own. */
 function loaderOfGeometry() {
   const loader = new GLTFLoader().setMeshoptDecoder(meshoptDecoder), loadTexture = async () => new Texture();
@@ -85,19 +99,33 @@ export class CellLoader {
     if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
     const { scene } = await this.#loader.parseAsync(await response.arrayBuffer(), "");
     signal?.throwIfAborted();
-    /** @type {Map<unknown, MeshBasicMaterial>} */
-    const looks = new Map();
+    // Of plain and of painted meshes, whose materials GLTFLoader tells apart only by `COLOR_0`.
+    /** @type {Map<unknown, MeshBasicMaterial>[]} */
+    const looks = [new Map(), new Map()];
+    // Meshes share them.
+    /** @type {Map<BufferAttribute, BufferAttribute>} */
+    const decoded = new Map();
     scene.traverse((node) => {
       if (!(node instanceof Mesh)) return;
-      const look = looks.get(node.material) ?? this.#look(node.material);
-      looks.set(node.material, look);
+      const { geometry, material } = node, { attributes } = geometry, codes = attributes._color;
+      if (codes) {
+        const colors = decoded.get(codes) ?? colorsOf(codes);
+        decoded.set(codes, colors);
+        geometry.setAttribute("color", colors).deleteAttribute("_color");
+      }
+      const painted = attributes.color !== undefined, known = looks[+painted];
+      const look = known.get(material) ?? this.#look(material, painted);
+      known.set(material, look);
       node.material = look;
     });
     return scene;
   }
 
-  /** @param {import("three").Material} material the loader's, with the extras as `userData` */
-  #look({ color, opacity, transparent, alphaTest, vertexColors, side, metalness, roughness, userData }) {
+  /**
+   * @param {import("three").Material} material the loader's, with the extras as `userData`
+   * @param {boolean} vertexColors
+   */
+  #look({ color, opacity, transparent, alphaTest, side, metalness, roughness, userData }, vertexColors) {
     const { texture, wrapS, wrapT, mesh, light, white, normal, probe } = userData;
     const wrap = (/** @type {number | undefined} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));

@@ -53,7 +53,11 @@ export class Texture extends EventDispatcher {
 export class DataTexture extends Texture {
   constructor(data: ArrayBufferView | null, width: number, height: number);
 }
-export class Color {}
+export class Color {
+  constructor(r: number, g: number, b: number);
+  r: number;
+  convertSRGBToLinear(): this;
+}
 export class Material {
   color: Color;
   opacity: number;
@@ -113,10 +117,13 @@ export class Object3D {
 export class Group extends Object3D {}
 export class Scene extends Object3D {}
 export class BufferAttribute {
-  constructor(numbers: Float32Array, size: number);
+  constructor(numbers: Float32Array | Uint16Array, size: number, normalized?: boolean);
+  array: Float32Array | Uint16Array | Uint8Array;
 }
 export class BufferGeometry {
+  attributes: Partial<Record<string, BufferAttribute>>;
   setAttribute(name: string, attribute: BufferAttribute): this;
+  deleteAttribute(name: string): this;
   dispose(): void;
 }
 export class ShaderMaterial extends Material {
