@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from ptmtools.site.content import SiteOptions, site_of  # noqa: E402
 from ptmtools.site.conversion import lean_glb  # noqa: E402
 from tests.e2e.conftest import make_museum  # noqa: E402
 from tests.site.mirrors import mirror_site, mirrors_of  # noqa: E402
-from tests.site.strips import EXPOSURE, EYES, lit_site, view_of  # noqa: E402
+from tests.site.strips import EXPOSURE, EYES, compressed, lit_site, view_of  # noqa: E402
 from tests.site.test_geometry import painted_glb  # noqa: E402
 from tests.systems.apo.statues import write_rooms  # noqa: E402
 
@@ -337,9 +338,11 @@ return { pictures, exposures };
 """
 
 
-@pytest.mark.parametrize("tone", ["neutral", "agx", "plain"])
+@pytest.mark.parametrize(
+    ("tone", "form"), [("neutral", compressed), ("agx", bytes), ("plain", bytes)]
+)
 def test_three_js_follows_the_formula_of_light(
-    three: Any, lit_rooms: Path, tmp_path: Path, tone: str
+    three: Any, lit_rooms: Path, tmp_path: Path, tone: str, form: Callable[[bytes], bytes]
 ) -> None:
     """Of lightmaps, of light at vertices, under a normal map, and around."""
     site = lit_site(
@@ -349,7 +352,8 @@ def test_three_js_follows_the_formula_of_light(
     for name, entry in site.entries.items():
         if name.startswith("data/"):
             path = "hints.json" if "/index-" in name else name.removeprefix("data/")
-            (tmp_path / path).write_bytes(entry.read())
+            data = entry.read()
+            (tmp_path / path).write_bytes(form(data) if name.endswith(".glb") else data)
     width, height = 320, 240
     angle = site.index["viewpoints"][0]["fieldOfView"]
     settings = {"width": width, "height": height, "angle": angle, "eyes": EYES}

@@ -11,10 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.output.gltf import pack
+from ptmtools.glb import elements
+from ptmtools.output.gltf import pack, unpack
+from ptmtools.output.gltf_compressed import CompressedBuffer
+from ptmtools.output.gltf_shapes import Vertices
 from ptmtools.rendering.tone import agx
 from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.site.content import Site
+from ptmtools.site.conversion import lean_glb
 from ptmtools.site.entry import SiteEntry
 from ptmtools.texture import EncodeOptions, encode, read_header
 
@@ -43,7 +47,7 @@ BASE, FACTOR = (180, 120, 60), (0.5, 0.7, 0.9)
 WHITE = {"mapped": 4.0, "bumpy": 4.0, "vertices": 2.0}
 #: Codes of the texels of a row of the lightmap, and linear colours of vertices at its ends.
 RAMP = np.rint(np.linspace((100.0, 240.0, 180.0), (240.0, 120.0, 180.0), 64))
-COLORS = np.array([(0.05, 0.9, 0.3), (0.8, 0.02, 0.3)])
+COLORS = to_linear(np.array([(63, 243, 149), (231, 37, 149)]) / 255)
 SLATE = np.array([0.16, 0.17, 0.19])
 
 
@@ -166,6 +170,30 @@ def glb(
         tree["nodes"].append({"mesh": number})
         tree["materials"].append(material)
     return pack(tree | {"buffers": [{"byteLength": len(binary)}]}, bytes(binary))
+
+
+def compressed(data: bytes) -> bytes:
+    """A GLB of `glb` without normals as a published site has it."""
+    tree, binary = unpack(data)
+    buffer = CompressedBuffer(-10)
+
+    def rows(numbers: Mapping[str, int], name: str) -> Any:
+        if name not in numbers:
+            return None
+        accessor = tree["accessors"][numbers[name]]
+        return elements(accessor, tree["bufferViews"][accessor["bufferView"]], binary)
+
+    for mesh in tree["meshes"]:
+        (primitive,) = mesh["primitives"]
+        names = ("POSITION", "TEXCOORD_0", "COLOR_0", "TEXCOORD_1")
+        point, uv, color, light = (rows(primitive["attributes"], name) for name in names)
+        corner = rows(primitive, "indices").reshape(-1, 3).astype(np.int64)
+        shape = Vertices(point, uv, color, corner, light)
+        mesh["primitives"] = [buffer.take(shape, primitive["material"], (None, None, None))]
+    for material in tree["materials"]:
+        material.setdefault("pbrMetallicRoughness", {})
+    buffer.finish()
+    return lean_glb(pack(tree | buffer.members(), buffer.bytes()))
 
 
 def developed(light: Floats, tone: str) -> Floats:
