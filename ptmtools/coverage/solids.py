@@ -6,9 +6,9 @@
 and grouped by shared edges; a group is a *solid* if it is closed (every edge is used an even number
 of times, so that the parity of the crossings along a ray does not depend on the ray), unless
 
-- most of its area lies in cell boundaries, or nearly all places in a cell are inside: then it is
-  structure, and the subdivision has already decided what lies behind it (the mesh of a whole
-  building is often one group), or
+- most of its area lies in cell boundaries, or it goes around a cell and contains nearly all places
+  there: then it is structure, and the subdivision has already decided what lies behind it (the
+  mesh of a whole building is often one group), or
 - its faces consistently point inwards: a shell that is meant to be seen from within.
 
 Rejected: the parity of all crossings (each open or single sheet inverts it), and the generalised
@@ -136,14 +136,21 @@ class SampleObstacles:
     ) -> SampleObstacles:
         """The obstacles of a subdivided scene; ``volumes`` are those of its cells."""
         corners, rest = scene.corners, tuple(solids(scene, cells))
-        places = [
-            v.sobol(0, 4 * _TESTS, 0)[:_TESTS, :3] for v in volumes or CellVolume.of_cells(cells)
+        tests = [
+            (points, bounds(volume.tetrahedra))
+            for volume in volumes or CellVolume.of_cells(cells)
+            if len(points := volume.sobol(0, 4 * _TESTS, 0)[:_TESTS, :3]) == _TESTS
         ]
-        tests = [points for points in places if len(points) == _TESTS]
         while True:
             obstacles = SampleObstacles(corners, Nearby(corners, 0.0), rest)
-            owners = [np.unique(obstacles.solid_of(t), return_counts=True) for t in tests]
-            shells = {n for o, count in owners for n in o[count >= _MOST * _TESTS] if n >= 0}
+            shells = set[int]()
+            for points, (low, high) in tests:
+                owner = obstacles.solid_of(points)
+                solid = int(np.sort(owner)[_TESTS // 2])
+                if solid >= 0 and (owner == solid).mean() >= _MOST:
+                    least, greatest = bounds(rest[solid])
+                    if (least <= low).all() and (high <= greatest).all():
+                        shells.add(solid)
             if not shells:
                 return obstacles
             rest = tuple(body for n, body in enumerate(rest) if n not in shells)
