@@ -12,8 +12,8 @@ after it as long as the openings repeat little of the site: links lead to these.
 of the client (docs/formats/client.md): the worth of a step by the pixels that need it, per byte.
 
 A site no larger than `WHOLE` has one opening, with the records, geometry and small textures of all
-cells after what its view needs: those of a small building take half the bytes in one gzip stream,
-as most of a small GLB or AVIF is a head like that of the others.
+cells after what its view needs: those of a small building take fewer bytes in one gzip stream, as
+most of a small GLB or AVIF is a head like that of the others.
 
 The file is one gzip stream, of which a browser unpacks the parts as they arrive:
 
@@ -64,6 +64,8 @@ LINES, FINER = 1080, 4
 SMALL = 4096
 #: Largest site with all rooms in an opening, bytes on the link without page, index and meshes.
 WHOLE = 1 << 18
+#: Kinds of files, as visitors of another room need them.
+KINDS = "record", "geometry", "texture", "preview"
 #: Share of a texture's pixels that may need a finer level than those of the opening.
 FEW = 0.02
 #: Largest share of a site that openings after the first repeat; the most openings: the page lists
@@ -219,7 +221,7 @@ def other_rooms(
     index: Mapping[str, Any], steps: Sequence[OpeningStep], sizes: Mapping[tuple[str, int], int]
 ) -> list[OpeningStep] | None:
     """The records, geometry and small textures of all cells that are not among the ``steps`` of a
-    view, by kind; None if all files of a site are larger than `WHOLE` together. ``sizes``: see
+    view, by `KINDS`; None if all files of a site are larger than `WHOLE` together. ``sizes``: see
     `ordered_steps`."""
     files, first, size = dict(sizes), 0, sum(sizes.values())
     for number, row in enumerate(index["textures"]):
@@ -232,8 +234,9 @@ def other_rooms(
             files |= whole
     if size > WHOLE:
         return None
-    rest = sorted(files.keys() - {(step.kind, step.number) for step in steps})
-    return [OpeningStep(*key, files[key], files[key], 0.0) for key in rest]
+    rest = files.keys() - {(step.kind, step.number) for step in steps}
+    in_order = sorted(rest, key=lambda key: (KINDS.index(key[0]), key[1]))
+    return [OpeningStep(*key, files[key], files[key], 0.0) for key in in_order]
 
 
 def contents_of(steps: Sequence[OpeningStep]) -> tuple[list[OpeningStep], list[OpeningStep]]:

@@ -24,7 +24,9 @@ from ptmtools.site.opening import (
     SMALL,
     NeedFinder,
     Needs,
+    OpeningStep,
     ordered_steps,
+    other_rooms,
     packed_opening,
     texture_steps,
 )
@@ -147,6 +149,20 @@ def test_that_of_a_small_site_has_all_rooms(
         monkeypatch.setattr(opening, "WHOLE", most)
         data = opening_of(site_of(two_rooms, SiteOptions(pictures=False)))
         assert sum(kind == "record" for kind, *_ in parts_of(data)) == expected
+
+
+def test_what_the_view_lacks_comes_as_visitors_of_other_rooms_need_it() -> None:
+    row = {"ends": [10, 100], "previews": [{"bytes": 30}, {"bytes": 40}]}
+    sizes = {(kind, number): 50 for number in range(3) for kind in ("record", "geometry")}
+    view = [OpeningStep("record", 1, 50, 50, 1.0), OpeningStep("preview", 0, 30, 30, 1.0)]
+    rest = other_rooms({"textures": [row, row, row | {"ends": [SMALL]}]}, view, sizes)
+    assert rest is not None
+    assert [(step.kind, step.number) for step in rest] == [
+        *(("record", number) for number in (0, 2)),
+        *(("geometry", number) for number in (0, 1, 2)),
+        *(("texture", number) for number in (0, 1)),
+        *(("preview", number) for number in (1, 2, 3)),
+    ]
 
 
 @pytest.mark.parametrize(
