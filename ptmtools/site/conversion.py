@@ -5,9 +5,8 @@ They read no names and no URIs of a cell's GLB, and the page draws shapes of one
 document loses these, objects become one node, and shapes of one look that lie side by side one
 primitive; the arrays stay byte for byte, but for colours. With gzip that saves 15 % in the sample
 museum and 11 % in the hospital. Colours of vertices, linear light in 16 bits, have 256 values:
-their sRGB codes, red and blue less green, take a quarter of the bytes, and a bathroom of 170,000
-triangles with its light at vertices less than half. Textures that browsers do not read are encoded
-again, and a site without exact levels has them without these.
+their sRGB codes, red and blue less green, take far fewer bytes. Textures that browsers do not read
+are encoded again, and a site without exact levels has them without these.
 """
 
 from __future__ import annotations
