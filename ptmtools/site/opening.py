@@ -281,7 +281,7 @@ def openings_of(
     size: int,
 ) -> Iterator[tuple[bytes, Sequence[float]]]:
     """The openings of the first viewpoints of a site, and the addresses of their views; a single
-    one, without address, if it has all rooms.
+    one, with a 1 after its address, if it has all rooms.
 
     Parameters
     ----------
@@ -310,6 +310,6 @@ def openings_of(
             if repeatable < 0:
                 return
         if rest is not None:
-            yield data, ()
+            yield data, [*address_of(viewpoint), 1]
             return
         yield data, address_of(viewpoint)

@@ -111,8 +111,8 @@ def page(
     ----------
     settings: the JSON that its script reads (docs/guide/publish.md).
     script: URL of its script. preload: URLs of the files that it fetches first.
-    openings: URLs, which differ in their last number, and the addresses of their views; an empty
-        one of an opening for all views.
+    openings: URLs, which differ in their last number, and the addresses of their views, see
+        `openings_of`.
     about: elements of the head for other programs (`ptmtools.site.about`).
 
     Raises InputError: PTM-I122 the template is missing.
@@ -123,10 +123,9 @@ def page(
     if openings:
         # The page makes it a preload, with the number of the view that its address leads to.
         views = json.dumps([*openings.values()], separators=(",", ":"))
-        listed = f'data-views="{views}" ' if all(openings.values()) else ""
         links.append(
             f'<link id="opening" rel="next" as="fetch" href="{next(iter(openings))}" '
-            f"{listed}crossorigin>"
+            f'data-views="{views}" crossorigin>'
         )
     links += about
     catalogue, works = settings.get("catalogue"), words_of("en")["markup"]["works"]

@@ -1,4 +1,5 @@
-// The requests of a page for an opening, by the lines of its screen, and the columns that it expects in view.
+// The requests of a page for an opening, by the lines of its screen, and the columns that it expects in view;
+// with a second argument, of a visitor who begins elsewhere.
 
 import { Stream } from "../../web/page/stream.js";
 
@@ -19,12 +20,12 @@ const stream = new Stream({
   estimate: { concurrency: 100 },
   fetcher: { requests: 0, bytes: 0, whole: async () => new Uint8Array(1) },
   opening: {
-    parts: [["preview", 0, 1]], next: Promise.resolve([[3, 700], [1, 300], [2, 600]]),
-    over: Promise.resolve(), bytes: 0, take: async () => null,
+    parts: [["preview", 0, 1]], take: async () => null,
+    next: Promise.resolve(process.argv.length < 4 ? [[3, 700], [1, 300], [2, 600]] : null),
   },
   decoders: { workers: {}, geometry: async () => null },
   report: (fault) => { throw fault; },
 });
-const present = [...await stream.follow({ angle: 1, across: () => lines })];
+const present = await stream.follow({ angle: 1, across: () => lines });
 await new Promise((done) => setImmediate(done));
-console.log(JSON.stringify({ asked, present }));
+console.log(JSON.stringify({ asked, present: present ? [...present] : null }));

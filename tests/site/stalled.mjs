@@ -14,12 +14,11 @@ const body = new ReadableStream({
     for (let at = 0; at < until; at += 7) controller.enqueue(whole.slice(at, Math.min(at + 7, until)));
   },
 });
-globalThis.fetch = async () => ({ ok: true, body, headers: new Headers() });
-const opening = new Opening("opening.bin");
+globalThis.fetch = async () => ({ body, headers: new Headers() });
+const opening = new Opening("opening.bin", true);
 await opening.next;
 const parts = [["record", 3], ["texture", 0], ["preview", 5], ["texture", 9]];
 const taken = await Promise.all(parts.map((part) => opening.take(...part)));
-await opening.over;
 console.log(JSON.stringify({
   taken: taken.map((part) => part && new TextDecoder().decode(part)), waited,
 }));

@@ -126,11 +126,19 @@ def test_a_link_close_by_brings_the_opening(
         assert (opening_name(large) in asked(visitor)) is expected
 
 
-def test_every_link_brings_an_opening_with_all_rooms(visit: Visiting, site: Site) -> None:
-    x, y, z, yaw = address_of(site.index["viewpoints"][1])
+@pytest.mark.parametrize("place", [0, 1])
+def test_every_link_brings_an_opening_with_all_rooms(
+    visit: Visiting, site: Site, place: int
+) -> None:
+    """The page knows whether it leads to the view of the opening."""
+    x, y, z, yaw = address_of(site.index["viewpoints"][place])
     with visit(site, query=f"#{x},{y},{z},{yaw}") as visitor:
         assert visitor.complete()["exact"]
         assert opening_name(site) in asked(visitor)
+        expected = visitor.page.evaluate(
+            "ptm.walk.stream.opening.next.then((next) => next !== null)"
+        )
+        assert expected is (place == 0)
 
 
 def test_a_link_to_a_viewpoint_brings_its_opening(

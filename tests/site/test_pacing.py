@@ -48,3 +48,10 @@ def test_small_screens_request_no_previews_that_are_too_fine(
         assert [share > 0 for share in columns] == [
             level is not None and 1 <= column <= level + 1 for column in range(5)
         ]
+
+
+def test_a_visitor_elsewhere_takes_the_parts_alone() -> None:
+    """Neither does the page request what the view of the opening needs next, nor expect it."""
+    actual = json.loads(node.run(HERE / "following.mjs", 1080, "elsewhere"))
+    assert [number for _, number, _ in actual["asked"]] == [0]
+    assert actual["present"] is None

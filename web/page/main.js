@@ -48,9 +48,9 @@ async function main() {
       throw new PageError("PTM-V102", page.noSimd);
     }
     const decoders = decodersOf(config), site = siteOf(config);
-    // The page knows whether there is one of the view that its address leads to.
-    const preload = /** @type {HTMLLinkElement | null} */ (document.querySelector("#opening[rel=preload]"));
-    const opening = preload ? new Opening(preload.href) : null;
+    // The page knows whether there is one for its address, and whether that leads to its view.
+    const preload = /** @type {HTMLLinkElement & {view: number} | null} */ (document.querySelector("#opening[rel=preload]"));
+    const opening = preload && new Opening(preload.href, preload.view >= 0);
     const query = new URLSearchParams(location.search), low = query.get("quality") === "low";
     const gl = contextOf(canvas, low);
     await speaking;

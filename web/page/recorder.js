@@ -66,15 +66,14 @@ export class Recorder {
     catalogue.meshes.forEach((_, k) => asked.set(stream.url("mesh", k), ["mesh", k]));
     const entries = [...performance.getEntriesByType("navigation"),
       ...performance.getEntriesByType("resource")];
-    const address = opening && new URL(opening.url, location.href).href;
     return /** @type {PerformanceResourceTiming[]} */ (entries)
       .filter(({ name, requestStart, transferSize }) => transferSize > 0
         && (asked.has(name) ? requestStart < 1000 * this.#begun : !/\.ptm$|\/sets\/\d/.test(name)))
       .flatMap(({ name, requestStart, encodedBodySize }) => {
         const at = short(requestStart / 1000);
-        if (name !== address) return [[at, ...(asked.get(name) ?? ["page", 0]), encodedBodySize]];
+        if (name !== opening?.url) return [[at, ...(asked.get(name) ?? ["page", 0]), encodedBodySize]];
         // The first levels of textures count as the page's: a file is whole, or is not there.
-        const { parts } = /** @type {NonNullable<typeof opening>} */ (opening);
+        const { parts } = opening;
         const size = parts.reduce((sum, [, , bytes]) => sum + bytes, 0);
         return parts.map(([kind, number, bytes]) => [at,
           ...(kind === "texture" ? ["page", 0] : [kind, number]), Math.round(bytes * encodedBodySize / size)]);

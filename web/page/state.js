@@ -17,7 +17,7 @@ export function stateOf(walk) {
     paperBytes: paperBytes(walk),
     geometryBytes: picture.renderer.bytes,
     requests: fetcher.requests,
-    bytes: fetcher.bytes,
+    bytes: fetcher.bytes + (stream.opening?.bytes ?? 0),
     pending: fetcher.pending,
     complete: walk.complete,
     exact: walk.exact,

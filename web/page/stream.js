@@ -77,34 +77,29 @@ export class Stream {
   }
 
   /**
-   * Requests all parts of the opening, in their order, and the previews that its view needs next on this
-   * screen. Returns the columns of textures that the view probably wants: those of its previews, of the first
-   * the most. Null without an opening.
+   * Requests all parts of the opening, in their order, and, if the visitor begins with its view, the previews
+   * that this needs next on this screen. Returns the columns of textures that the view probably wants: those
+   * of its previews, of the first the most. Null without an opening, or elsewhere.
    * @param {import("./gl/viewport.js").Viewport} viewport
    */
   async follow(viewport) {
     const { client: { catalogue: { T, K }, downloads }, fetcher, opening } = this;
     if (!opening) return null;
     fetcher.requests++;
-    opening.over.then(() => (fetcher.bytes += opening.bytes));
     const next = await opening.next, present = new Float64Array(T * K);
-    /** @type {[import("./policy/downloads.js").Kind, number, number | undefined][]} */
-    const steps = opening.parts.map(([kind, number, size]) =>
-      [kind, number, kind === "texture" ? size : undefined]);
-    const lines = viewport.across(viewport.angle);
-    for (const [number, few] of next) if (lines > few) steps.push(["preview", number, undefined]);
+    const steps = [...opening.parts], lines = viewport.across(viewport.angle);
+    for (const [number, few] of next ?? []) if (lines > few) steps.push(["preview", number, 0]);
     steps.forEach(([kind, place, end], order) => {
       const preview = kind === "preview";
       const number = preview ? this.previews.findIndex((file) => file.place === place) : place;
-      const later = order >= opening.parts.length;
-      if (number < 0 || (later && this.rests) || !downloads.free(kind, number)) return;
+      if (number < 0 || (order >= opening.parts.length && this.rests) || !downloads.free(kind, number)) return;
       this.ask(downloads.ask(kind, number, steps.length - order, end));
       if (!preview) return;
       const { texture, row: { level } } = this.previews[number];
       const first = texture * K + 1, share = present[first] || 1 / (2 + order);
       present.fill(share, first, first + level + 1);
     });
-    return present;
+    return next && present;
   }
 
   /**

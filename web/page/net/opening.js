@@ -8,38 +8,28 @@ import { PATIENCE } from "./fetcher.js";
 /** @typedef {import("../policy/downloads.js").Kind} Kind */
 
 /**
- * A result; throws if it takes too long.
+ * A result; rejects if it takes too long.
  * @template R
  * @param {Promise<R>} result
  * @returns {Promise<R>}
  */
-function patiently(result) {
-  return Promise.race([result, new Promise((_, fail) => {
-    setTimeout(() => fail(new Error()), 1000 * PATIENCE);
-  })]);
-}
+const patiently = (result) =>
+  Promise.race([result, new Promise((_, fail) => setTimeout(fail, 1000 * PATIENCE))]);
 
-/** The bytes of a stream as they arrive. */
-class Arriving {
-  #bytes = new Uint8Array(0);
-  #reader;
-
-  /** @param {ReadableStream<Bytes>} body */
-  constructor(body) {
-    this.#reader = body.getReader();
-  }
-
-  /** The next bytes; throws if the response ends before. @param {number} count @returns {Promise<Bytes>} */
-  async take(count) {
-    while (this.#bytes.length < count) {
-      const { done, value } = await patiently(this.#reader.read());
-      if (done) throw new Error();
-      this.#bytes = new Uint8Array(await new Blob([this.#bytes, value]).arrayBuffer());
+/** Returns the next bytes of a stream as they arrive; rejects if it ends before. @param {ReadableStream<Bytes>} stream */
+function arriving(stream) {
+  const reader = stream.getReader();
+  let bytes = new Uint8Array(0);
+  return async (/** @type {number} */ count) => {
+    while (bytes.length < count) {
+      const { value } = await patiently(reader.read());
+      if (!value) throw new Error();
+      bytes = new Uint8Array(await new Blob([bytes, value]).arrayBuffer());
     }
-    const taken = this.#bytes.slice(0, count);
-    this.#bytes = this.#bytes.subarray(count);
+    const taken = bytes.slice(0, count);
+    bytes = bytes.subarray(count);
     return taken;
-  }
+  };
 }
 
 export class Opening {
@@ -50,46 +40,44 @@ export class Opening {
   /** By kind and number. @type {Map<string, Promise<Bytes | null>>} */
   #coming = new Map();
 
-  /** @param {string} url */
-  constructor(url) {
+  /** @param {string} url @param {boolean} here whether the visitor begins with its view */
+  constructor(url, here) {
     this.url = url;
-    const arriving = this.#open(url);
     /**
      * The previews that the view needs next, each with the lines of the largest screen that does not need it,
-     * once all parts are known.
-     * @type {Promise<[number, number][]>}
+     * once all parts are known; null elsewhere, and of an opening that fails.
+     * @type {Promise<[number, number][] | null>}
      */
-    this.next = arriving.then(({ next }) => next, () => []);
-    /** Resolved when all parts are here, or no more will come. @type {Promise<void>} */
-    this.over = arriving.then(({ last }) => last).then(() => {}, () => {});
+    this.next = this.#open(url, here).catch(() => null);
   }
 
-  /** @param {string} url @returns {Promise<{last: Promise<unknown>, next: [number, number][]}>} */
-  async #open(url) {
-    const { ok, body, headers } = await patiently(fetch(url));
-    if (!ok || !body) throw new Error();
+  /** @param {string} url @param {boolean} here @returns {Promise<[number, number][] | null>} */
+  async #open(url, here) {
+    const { body, headers } = await patiently(fetch(url));
     this.bytes = Number(headers.get("content-length"));
-    const bytes = new Arriving(body.pipeThrough(new DecompressionStream("gzip")));
-    const length = new DataView((await bytes.take(4)).buffer).getUint32(0, true);
-    const { parts, next } = JSON.parse(new TextDecoder().decode(await bytes.take(length)));
+    // What is no opening cannot be unpacked, either.
+    const packed = /** @type {ReadableStream<Bytes>} */ (body);
+    const take = arriving(packed.pipeThrough(new DecompressionStream("gzip")));
+    const length = new DataView((await take(4)).buffer).getUint32(0, true);
+    const { parts, next } = JSON.parse(new TextDecoder().decode(await take(length)));
     /** @type {Promise<unknown>} */
     let last = Promise.resolve();
     for (const [kind, number, size] of parts) {
-      const part = last.then(() => bytes.take(size));
+      const part = last.then(() => take(size));
       this.#coming.set(kind + number, part.catch(() => null));
       last = part;
     }
     this.parts = parts;
-    return { last, next };
+    return here ? next : null;
   }
 
   /**
-   * The bytes of a part, once they are here; null if it has no such part.
+   * The bytes of a part, once they are here; nothing if it has no such part.
    * @param {Kind} kind
    * @param {number} number
    */
   async take(kind, number) {
     await this.next;
-    return (await this.#coming.get(kind + number)) ?? null;
+    return this.#coming.get(kind + number);
   }
 }

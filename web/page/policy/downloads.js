@@ -123,13 +123,13 @@ export class Downloads {
    * @param {Kind} kind
    * @param {number} number
    * @param {number} priority
-   * @param {number} [end] of a texture
+   * @param {number} [end] of a texture; a file of another kind has one
    * @returns {Request}
    */
-  ask(kind, number, priority, end) {
+  ask(kind, number, priority, end = 0) {
     const { recordBytes, geometryBytes, previews, meshes } = this.#stock;
     const whole = { record: recordBytes, geometry: geometryBytes, preview: previews.bytes };
-    end ??= kind === "texture" ? 0 : kind === "mesh" ? meshes[number].bytes : whole[kind][number];
+    if (kind !== "texture") end = kind === "mesh" ? meshes[number].bytes : whole[kind][number];
     const begin = kind === "texture" ? this.bytes[number] : 0;
     const request = { kind, number, begin, end, priority, left: OVERHEAD + end - begin };
     this.#state[kind][number] = ASKED;
