@@ -92,7 +92,7 @@ def visit(browser: object, site: Site, bandwidth: float) -> tuple[float, float, 
         first = time.perf_counter() - begun
         page.wait_for_function("window.ptm.walk.complete", timeout=600_000, polling=50)
         whole = time.perf_counter() - begun
-        size = page.evaluate("window.ptm.walk.stream.fetcher.bytes") / 1000
+        size = page.evaluate("window.ptm.state().bytes") / 1000
         page.context.close()
     return first, whole, size
 
