@@ -112,6 +112,16 @@ def test_an_opening_that_never_arrives_costs_only_time(visit: Visiting, site: Si
         assert visitor.complete()["exact"]
 
 
+def test_browsers_that_cannot_unpack_it_do_not_fetch_it(visit: Visiting, site: Site) -> None:
+    def prepare(page: Any) -> None:
+        page.add_init_script("delete window.DecompressionStream")
+
+    with visit(site, prepare=prepare) as visitor:
+        assert visitor.complete()["exact"]
+        assert opening_name(site) not in asked(visitor)
+        assert visitor.messages == []
+
+
 @pytest.mark.parametrize(
     ("aside", "turned", "expected"),
     [(0.0, 0.0, True), (0.4, 9.0, True), (0.0, 351.0, True), (0.0, -369.0, True)]
