@@ -186,4 +186,5 @@ def test_a_silent_connection_gives_up_the_rest(there: int) -> None:
     actual = json.loads(node.run(HERE / "stalled.mjs", json.dumps([*data]), end))
     expected = ["room", "levels", "image"][:there]
     assert actual["taken"] == expected + [None] * (4 - there)
+    assert actual["bytes"] == end
     assert actual["waited"] == 20_000

@@ -35,7 +35,7 @@ function arriving(stream) {
 export class Opening {
   /** Kind, number and bytes of each part, once known. @type {[Kind, number, number][]} */
   parts = [];
-  /** Bytes of the answer, as the host states them. */
+  /** Compressed bytes received. */
   bytes = 0;
   /** By kind and number. @type {Map<string, Promise<Bytes | null>>} */
   #coming = new Map();
@@ -53,11 +53,17 @@ export class Opening {
 
   /** @param {string} url @param {boolean} here @returns {Promise<[number, number][] | null>} */
   async #open(url, here) {
-    const { body, headers } = await patiently(fetch(url));
-    this.bytes = Number(headers.get("content-length"));
+    const { body } = await patiently(fetch(url));
+    /** @type {TransformStream<Bytes, Bytes>} */
+    const counted = new TransformStream({
+      transform: (chunk, after) => {
+        this.bytes += chunk.length;
+        after.enqueue(chunk);
+      },
+    });
     // What is no opening cannot be unpacked, either.
     const packed = /** @type {ReadableStream<Bytes>} */ (body);
-    const take = arriving(packed.pipeThrough(new DecompressionStream("gzip")));
+    const take = arriving(packed.pipeThrough(counted).pipeThrough(new DecompressionStream("gzip")));
     const length = new DataView((await take(4)).buffer).getUint32(0, true);
     const { parts, next } = JSON.parse(new TextDecoder().decode(await take(length)));
     /** @type {Promise<unknown>} */
