@@ -105,7 +105,7 @@ def natural(value: object) -> int:
     return value
 
 
-FLOAT, BYTE, UNSIGNED, SHORT, INT = 5126, 5120, 5121, 5123, 5125
+FLOAT, BYTE, UNSIGNED_BYTE, SHORT, INT = 5126, 5120, 5121, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
 #: The extension that normals of bytes need; it is required of readers.
 QUANTIZATION = "KHR_mesh_quantization"

@@ -22,7 +22,7 @@ import numpy as np
 
 from ptmtools.errors import InputError, naming
 from ptmtools.files import open_regular
-from ptmtools.glb import COMPONENTS, UNSIGNED
+from ptmtools.glb import COMPONENTS, UNSIGNED_BYTE
 from ptmtools.meshopt.decoding import decode
 from ptmtools.meshopt.encoding import encode_attributes
 from ptmtools.output.gltf import pack, unpack
@@ -190,7 +190,7 @@ def _code_colors(
     painted = [p["attributes"] for p in primitives if "COLOR_0" in p["attributes"]]
     colors = {document["accessors"][a["COLOR_0"]]["bufferView"] for a in painted}
     for number in {attributes["COLOR_0"] for attributes in painted}:
-        document["accessors"][number] |= {"componentType": UNSIGNED, "normalized": False}
+        document["accessors"][number] |= {"componentType": UNSIGNED_BYTE, "normalized": False}
     for attributes in painted:
         attributes[CODES] = attributes.pop("COLOR_0")
     data = b""

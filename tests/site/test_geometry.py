@@ -117,6 +117,30 @@ def test_the_page_reads_the_same_colours(tmp_path: Path) -> None:
     assert sorted(len(shape["colors"] or ()) for shape in after) == [0, 4 * count, 4 * count]
 
 
+def test_bytes_are_colours_only_where_they_are_named_so(tmp_path: Path) -> None:
+    point = np.eye(3, dtype="<f4")
+    corner = np.array([0, 1, 2, 0], np.uint8)
+    tree = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0], "extras": {"cell": 0}}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5121, "count": 3, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 3},
+        ],
+        "buffers": [{"byteLength": 40}],
+    }
+    (tmp_path / "bytes.glb").write_bytes(pack(tree, point.tobytes() + corner.tobytes()))
+    ((shape,),) = json.loads(node.run(HERE / "painted.mjs", tmp_path / "bytes.glb"))
+    assert shape["indices"] == [0, 1, 2]
+
+
 def test_an_empty_cell() -> None:
     tree = {
         "asset": {"version": "2.0", "generator": "ptmtools"},

@@ -45,10 +45,16 @@ const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 const LINEAR = Array.from({ length: 256 }, (_, code) =>
   Math.round(65535 * (code < 11 ? code / 255 / 12.92 : ((code / 255 + 0.055) / 1.055) ** 2.4)));
 
-/** Linear colours of the codes red − green, green, blue − green, modulo 256, and 0. @param {Uint8Array} codes */
+/** Linear colours of the codes red − green, green, blue − green, modulo 256, and 0. @param {Numbers} codes */
 function colorsOf(codes) {
-  return new Uint16Array(codes).map((code, k) =>
-    k % 4 > 2 ? 65535 : LINEAR[k % 4 === 1 ? code : (code + codes[k - k % 4 + 1]) & 255]);
+  const colors = new Uint16Array(codes.length).fill(65535);
+  for (let k = 0; k < codes.length; k += 4) {
+    const green = codes[k + 1];
+    colors[k] = LINEAR[codes[k] + green & 255];
+    colors[k + 1] = LINEAR[green];
+    colors[k + 2] = LINEAR[codes[k + 2] + green & 255];
+  }
+  return colors;
 }
 
 /** The arrays of a GLB, by the numbers of their accessors. */
@@ -69,8 +75,8 @@ class Arrays {
     this.decoder = decoder;
   }
 
-  /** The numbers of an accessor of vertices. @param {number} number @returns {Numbers} */
-  vertices(number) {
+  /** The numbers of an accessor of vertices, or the colours if they are codes. @param {number} number @returns {Numbers} */
+  vertices(number, codes = false) {
     const known = this.#read.get(number);
     if (known) return known;
     const row = this.tree.accessors[number], { bytes, stride } = this.#elements(row.bufferView);
@@ -87,7 +93,7 @@ class Arrays {
         for (let n = 0; n < items; n++) numbers[items * k + n] = all[at + n];
       }
     }
-    if (numbers instanceof Uint8Array) numbers = colorsOf(numbers);
+    if (codes) numbers = colorsOf(numbers);
     this.#read.set(number, numbers);
     return numbers;
   }
@@ -195,7 +201,7 @@ export async function readGlb(buffer, textures, decoder) {
       const positions = /** @type {Float32Array} */ (arrays.vertices(attributes.POSITION));
       await pause();
       const uvs = textured ? /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_0)) : null;
-      const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(color)) : null;
+      const colors = painted ? /** @type {Uint16Array} */ (arrays.vertices(color, "_COLOR" in attributes)) : null;
       const spots = light < 0 ? null : /** @type {Float32Array} */ (arrays.vertices(attributes.TEXCOORD_1));
       const normals = probe >= 0 && "NORMAL" in attributes ? arrays.vertices(attributes.NORMAL) : null;
       const framed = normalCoords === undefined ? ["TEXCOORD_1", "NORMAL", "TANGENT"] : ["TEXCOORD_" + normalCoords];
