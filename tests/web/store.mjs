@@ -264,6 +264,11 @@ for (const last of ["", " catalogue.html"]) {
   for (const [name, visits] of Object.entries(cases)) print(`document ${name}`, await visit(visits));
 }
 {
+  const { neededBy } = await load("names"), hash = "0123456789", viewer = `viewer-${hash}/viewer.js`;
+  const names = [`data/poster-${hash}.jpg`, `data/picture-${hash}.jpg`, `data/opening-${hash}-0.bin`, viewer];
+  print("needed", { names: neededBy(names.map((name) => `<a href="https://site.test/${name}">`).join("")) });
+}
+{
   // Any ranges in any order: the answers are right, and no byte that is kept is asked for at an end of a range.
   let seed = 1;
   const random = (n) => (seed = (seed * 48271) % 2147483647) % n;

@@ -185,6 +185,14 @@ def test_documents(
     assert row["kept"] == kept
 
 
+def test_a_page_starts_without_openings_and_pictures_of_link_previews(
+    rows: dict[str, dict[str, Any]],
+) -> None:
+    viewer = "viewer-0123456789"
+    expected = ["data/poster-0123456789.jpg", f"{viewer}/viewer.js", f"{viewer}/later.js"]
+    assert rows["needed"]["names"] == expected
+
+
 def test_any_ranges_in_any_order(rows: dict[str, dict[str, Any]]) -> None:
     row = rows["random"]
     assert (row["wrong"], row["needless"]) == (0, 0)

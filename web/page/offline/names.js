@@ -33,10 +33,11 @@ export const marksIn = (text) => text.match(MARK) ?? [];
 /** What a text has to name so that a file stays. @param {string} name */
 export const markOf = (name) => marksIn(name.replace(/^data\/(?:sets\/)?/, ""))[0];
 
-/** The files without which a page does not start, and its panels: openings are of one view each.
+/** The files without which a page does not start, and its panels. It starts without an opening, which is kept if
+ * it has come (`Visits.keep`); only link previews show a picture.
  * @param {string} html @returns {string[]} */
 export function neededBy(html) {
-  const named = new Set((html.match(MENTION) ?? []).filter((name) => isFile(name) && !name.includes("/opening-")));
+  const named = new Set((html.match(MENTION) ?? []).filter((name) => isFile(name) && !/\/(?:opening|picture)-/.test(name)));
   const viewer = [...named].find((name) => name.endsWith("/viewer.js"));
   return viewer ? [...named, viewer.replace("viewer.js", "later.js")] : [...named];
 }
