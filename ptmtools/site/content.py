@@ -283,9 +283,9 @@ class _Builder:
             both = self._files.render(lambda: _viewpoints(self._served), self._folder.path)
             drawn, small = both or (b"", [])
             if drawn and not poster:
-                light = len(drawn) <= POSTER_SHARE * self._size()
-                picture = self._files.add("poster" if light else "picture", ".jpg", JPEG, drawn)
-                poster = picture if light else ""
+                shown = len(drawn) <= POSTER_SHARE * self._size()
+                picture = self._files.add("poster" if shown else "picture", ".jpg", JPEG, drawn)
+                poster = picture if shown else ""
             for number, (row, data) in enumerate(zip(rows, small, strict=False)):
                 row["thumbnail"] = self._files.add(f"vp-{number:03}", ".jpg", JPEG, data)
         poster, picture = (name and f"{DATA}/{name}" for name in (poster, picture or poster))

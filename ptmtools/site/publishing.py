@@ -239,9 +239,9 @@ def weight_of(site: Site) -> Weight:
     used |= {"tour.js" for name in site.entries if name.startswith(f"{DATA}/tour-")}
     unused = {*LATER, *attached_scripts()} - used
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, unused)}
-    begin = next((n for n in site.entries if re.fullmatch(_FIRST_OPENING, n)), "")
+    opening = next((n for n in site.entries if re.fullmatch(_FIRST_OPENING, n)), "")
     repeated = 0
-    for kind, number, size in parts_of(site.entries[begin].read()) if begin else ():
+    for kind, number, size in parts_of(site.entries[opening].read()) if opening else ():
         whole = kind in ("record", "geometry")
         repeated += index["cells"][number][f"{kind}Bytes"] if whole else size
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
@@ -255,7 +255,9 @@ def weight_of(site: Site) -> Weight:
         mean_room=round(sum(rooms.values()) / len(rooms)),
         worst_room=rooms[worst],
         worst_cell=worst,
-        whole=sum(bytes_of.values()) - repeated + (link_bytes(site.entries[begin]) if begin else 0),
+        whole=sum(bytes_of.values())
+        - repeated
+        + (link_bytes(site.entries[opening]) if opening else 0),
     )
 
 
