@@ -111,8 +111,7 @@ def page(
     ----------
     settings: the JSON that its script reads (docs/guide/publish.md).
     script: URL of its script. preload: URLs of the files that it fetches first.
-    openings: URLs, which differ in their last number, and the addresses of their views, see
-        `openings_of`.
+    openings: URLs, which differ in their last number, and addresses, see `openings_of`.
     about: elements of the head for other programs (`ptmtools.site.about`).
 
     Raises InputError: PTM-I122 the template is missing.

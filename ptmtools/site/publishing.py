@@ -240,10 +240,10 @@ def weight_of(site: Site) -> Weight:
     unused = {*LATER, *attached_scripts()} - used
     bytes_of = {n: link_bytes(e) for n, e in site.entries.items() if _is_walked(n, unused)}
     opening = next((n for n in site.entries if re.fullmatch(_FIRST_OPENING, n)), "")
-    repeated = 0
+    saved = -link_bytes(site.entries[opening]) if opening else 0
     for kind, number, size in parts_of(site.entries[opening].read()) if opening else ():
         whole = kind in ("record", "geometry")
-        repeated += index["cells"][number][f"{kind}Bytes"] if whole else size
+        saved += index["cells"][number][f"{kind}Bytes"] if whole else size
     begins = (f"{DATA}/index-", f"{DATA}/poster-")
     page = sum(size for name, size in bytes_of.items() if not name.startswith(f"{DATA}/"))
     before = sum(size for name, size in bytes_of.items() if name.startswith(begins))
@@ -255,9 +255,7 @@ def weight_of(site: Site) -> Weight:
         mean_room=round(sum(rooms.values()) / len(rooms)),
         worst_room=rooms[worst],
         worst_cell=worst,
-        whole=sum(bytes_of.values())
-        - repeated
-        + (link_bytes(site.entries[opening]) if opening else 0),
+        whole=sum(bytes_of.values()) - saved,
     )
 
 
