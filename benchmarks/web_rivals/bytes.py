@@ -23,7 +23,7 @@ from ptmtools.output.emission import compress
 from ptmtools.site.entry import SiteEntry, link_bytes
 
 #: What of a site's data is neither geometry nor texture: first letters of names.
-_PICTURES = ("poster-", "vp-", "icon-")
+_PICTURES = ("poster-", "picture-", "vp-", "icon-")
 
 
 @dataclass(frozen=True)
