@@ -59,25 +59,29 @@ def find_solids(
     points: Floats,
     turned: Floats,
     rank: Ints,
+    near: Ints,
     boxes: Floats,
     begin: Ints,
     corners: Floats,
+    frames: Floats,
     crossed: Ints,
     owner: Ints,
 ) -> None:
     """Writes to ``owner`` (n,), where it is -1, the first solid that contains a point: most of the
-    three rays from it cross the solid an odd number of times.
+    three rays from there cross it an odd number of times.
 
     Parameters
     ----------
     points: (n, 3).
-    turned: (3, n, 3) in frames in which a ray runs along +z, in the order of their x.
+    turned: (3, n, 3) in the ``frames``, in the order of their x.
     rank: (3, n) the places of the points in these orders.
-    boxes, begin: (B, 2, 3) of the solids, and (B + 1,) their triangles in ``corners``.
-    corners: (3, m, 3, 3) in the frames.
+    near: the solids.
+    boxes, begin: (B, 2, 3) of all solids, and (B + 1,) their triangles in ``corners``.
+    corners: (m, 3, 3).
+    frames: (3, 3, 3) for each ray a rotation, in which it runs along +z.
     crossed: (3, n) overwritten.
     """
-    for s in range(len(boxes)):
+    for s in near:
         counted = False
         for i in range(len(points)):
             if owner[i] >= 0:
@@ -91,7 +95,7 @@ def find_solids(
                 crossed[:] = 0
                 for ray in range(3):
                     for t in range(begin[s], begin[s + 1]):
-                        add_crossings(turned[ray], corners[ray, t], crossed[ray])
+                        add_crossings(turned[ray], corners[t], frames[ray], crossed[ray])
                 counted = True
             odd = 0
             for ray in range(3):
@@ -101,10 +105,20 @@ def find_solids(
 
 
 @plain_kernel
-def add_crossings(points: Floats, corner: Floats, crossed: Ints) -> None:
-    """Adds 1 to ``crossed`` (n,) of each of the (n, 3) points, in the order of x, from which the
-    ray along +z crosses a (3, 3) triangle."""
-    a, b, c = corner[0], corner[1], corner[2]
+def rotate(frame: Floats, p: Floats) -> tuple[float, float, float]:
+    """A (3,) point in a frame whose rows are the axes; equal points stay equal."""
+    return (
+        p[0] * frame[0, 0] + p[1] * frame[0, 1] + p[2] * frame[0, 2],
+        p[0] * frame[1, 0] + p[1] * frame[1, 1] + p[2] * frame[1, 2],
+        p[0] * frame[2, 0] + p[1] * frame[2, 1] + p[2] * frame[2, 2],
+    )
+
+
+@plain_kernel
+def add_crossings(points: Floats, corner: Floats, frame: Floats, crossed: Ints) -> None:
+    """Adds 1 to ``crossed`` (n,) of each of the (n, 3) points in a frame, in the order of x, from
+    which the ray along +z crosses a (3, 3) triangle."""
+    a, b, c = rotate(frame, corner[0]), rotate(frame, corner[1]), rotate(frame, corner[2])
     low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
     west, east, top = min(a[0], b[0], c[0]), max(a[0], b[0], c[0]), max(a[2], b[2], c[2])
     for i in range(np.searchsorted(points[:, 0], west), len(points)):

@@ -136,20 +136,21 @@ class SampleObstacles:
     ) -> SampleObstacles:
         """The obstacles of a subdivided scene; ``volumes`` are those of its cells."""
         corners, rest = scene.corners, tuple(solids(scene, cells))
+        nearby, slack = Nearby(corners, 0.0), scene.tolerance.noise
         tests = [
             (points, bounds(volume.tetrahedra))
             for volume in volumes or CellVolume.of_cells(cells)
             if len(points := volume.sobol(0, 4 * _TESTS, 0)[:_TESTS, :3]) == _TESTS
         ]
         while True:
-            obstacles = SampleObstacles(corners, Nearby(corners, 0.0), rest)
+            obstacles = SampleObstacles(corners, nearby, rest)
             shells = set[int]()
             for points, (low, high) in tests:
                 owner = obstacles.solid_of(points)
                 solid = int(np.sort(owner)[_TESTS // 2])
                 if solid >= 0 and (owner == solid).mean() >= _MOST:
                     least, greatest = bounds(rest[solid])
-                    if (least <= low).all() and (high <= greatest).all():
+                    if (least <= low + slack).all() and (high <= greatest + slack).all():
                         shells.add(solid)
             if not shells:
                 return obstacles
@@ -164,21 +165,25 @@ class SampleObstacles:
         from ptmtools.coverage.kernels import find_solids
 
         owner = np.full(len(points), -1)
-        if self.solids:
+        if self.solids and len(points):
+            boxes, begin, corners = self._bodies
+            low, high = bounds(points)
+            near = np.all((boxes[:, 0] <= high) & (low <= boxes[:, 1]), axis=1)
             turned = np.einsum("ij,fkj->fik", points, FRAMES)
             order = np.argsort(turned[..., 0], axis=1, kind="stable")
             turned = np.take_along_axis(turned, order[..., None], axis=1)
             crossed, rank = np.zeros_like(order), np.argsort(order, axis=1)
-            find_solids(points, turned, rank, *self._bodies, crossed, owner)
+            find_solids(
+                points, turned, rank, np.flatnonzero(near), boxes, begin, corners, FRAMES, crossed,
+                owner,
+            )  # fmt: skip
         return owner
 
     @cached_property
     def _bodies(self) -> tuple[Floats, Ints, Floats]:
-        """The boxes of the solids, their first triangles and all corners, as `find_solids` takes
-        them."""
+        """The boxes of the solids, their first triangles and all corners: see `find_solids`."""
         boxes = np.array([bounds(corners) for corners in self.solids])
-        begin = np.cumsum([0, *map(len, self.solids)])
-        return boxes, begin, np.einsum("tij,fkj->ftik", np.concatenate(self.solids), FRAMES)
+        return boxes, np.cumsum([0, *map(len, self.solids)]), np.concatenate(self.solids)
 
     def clearance(self, points: Floats, enough: float) -> Floats:
         """(n,) distance in metres from each of the (n, 3) points to the nearest surface, at most
