@@ -63,7 +63,7 @@ def refused(code: str) -> Iterator[None]:
     assert raised.value.code == code
 
 
-def told(site: Site) -> Any:
+def config_of(site: Site) -> Any:
     """What the page tells its script."""
     page = site.entries["index.html"].read().decode()
     actual = re.search(r'<script type="application/json" id="site">(.*?)</script>', page, re.DOTALL)
@@ -98,7 +98,7 @@ def test_names_are_hashes(site: Site, two_rooms: Path) -> None:
 
 def test_the_index(site: Site, two_rooms: Path) -> None:
     """What the index names is there, of the size that it tells; the rest is that of the hints."""
-    config = told(site)
+    config = config_of(site)
     data = site.entries[config["index"]].read()
     index = schemas.read(data, schemas.SITE)
     assert index == site.index
@@ -153,7 +153,7 @@ def test_without_exact_levels(two_rooms: Path, site: Site) -> None:
         assert len(levels) == len(before) or (finest and finest["level"] == len(before) - 1)
         cut += len(levels) < len(before)
     assert cut
-    schemas.read(never.entries[told(never)["index"]].read(), schemas.SITE)
+    schemas.read(never.entries[config_of(never)["index"]].read(), schemas.SITE)
 
 
 def test_without_a_lossless_image(tmp_path: Path) -> None:
@@ -175,7 +175,7 @@ def test_without_previews(two_rooms: Path) -> None:
 
 
 def test_the_page(site: Site, two_rooms: Path) -> None:
-    config = told(site)
+    config = config_of(site)
     page = site.entries["index.html"].read().decode()
     assert "{{" not in page
     for kind in ("index", "worker", "wasm", "poster"):
@@ -191,7 +191,7 @@ def test_the_page(site: Site, two_rooms: Path) -> None:
     odd = site_of(two_rooms, SiteOptions("</script><b>&", pictures=False))
     text = odd.entries["index.html"].read().decode()
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in text
-    assert told(odd)["title"] == "</script><b>&"
+    assert config_of(odd)["title"] == "</script><b>&"
     plain = site_of(two_rooms, SiteOptions(pictures=False, opening=False))
     text = plain.entries["index.html"].read().decode()
     first = site.index["cells"][site.index["viewpoints"][0]["cell"]]
@@ -202,7 +202,7 @@ def test_the_page(site: Site, two_rooms: Path) -> None:
 
 
 def test_pictures(site: Site) -> None:
-    poster = site.entries[told(site)["poster"]].read()
+    poster = site.entries[config_of(site)["poster"]].read()
     assert len(poster) <= drawing.POSTER.most
     image = Image.open(io.BytesIO(poster))
     assert (image.format, image.size) == ("JPEG", drawing.POSTER.size)
@@ -218,7 +218,7 @@ def test_a_poster_heavier_than_the_building_is_not_shown(two_rooms: Path) -> Non
     """Link previews have it."""
     site = site_of(two_rooms)
     (picture,) = (name for name in site.entries if name.startswith("data/picture-"))
-    assert told(site)["poster"] is None
+    assert config_of(site)["poster"] is None
     page = site.entries["index.html"].read().decode()
     assert f'<meta property="og:image" content="{picture}">' in page
     assert "<img" not in page
@@ -244,7 +244,7 @@ def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> No
     triangles = triangles_of(served.surfaces)
     there = np.ones(served.cell_count, dtype=np.bool_)
     shade(sight, triangles, own_levels(pyramids), there, pyramids.levels, shown)
-    poster = Image.open(io.BytesIO(site.entries[told(site)["poster"]].read())).resize((160, 90))
+    poster = Image.open(io.BytesIO(site.entries[config_of(site)["poster"]].read())).resize((160, 90))
     textured = (sight.triangle >= 0) & (triangles.texture[sight.triangle] >= 0)
     assert textured.mean() > 0.2
     off = np.abs(np.asarray(poster, dtype=float).reshape(-1, 3) - shown)[textured]
@@ -256,8 +256,8 @@ def test_pictures_of_others(two_rooms: Path, tmp_path: Path, monkeypatch: Any) -
     file = tmp_path / "own.png"
     Image.new("RGB", (8, 8)).save(file)
     own = site_of(two_rooms, SiteOptions(poster=str(file), pictures=False))
-    assert own.entries[told(own)["poster"]].read() == file.read_bytes()
-    assert own.entries[told(own)["poster"]].media == "image/png"
+    assert own.entries[config_of(own)["poster"]].read() == file.read_bytes()
+    assert own.entries[config_of(own)["poster"]].media == "image/png"
     assert "thumbnail" not in own.index["viewpoints"][0]
     for name in ("model/two_rooms.obj", "gone.png"):
         with refused("PTM-I125"):
@@ -268,7 +268,7 @@ def test_pictures_of_others(two_rooms: Path, tmp_path: Path, monkeypatch: Any) -
 
     monkeypatch.setattr(drawing, "pictures", without)
     bare = site_of(two_rooms)
-    assert told(bare)["poster"] is None
+    assert config_of(bare)["poster"] is None
     assert any("embreex" in note for note in bare.notes)
 
 
@@ -407,7 +407,7 @@ def test_weight(site: Site) -> None:
     for texture in record["textures"][0]:
         header = read_header(site.entries[f"data/{site.index['textures'][texture]['file']}"].read())
         room += max(o.end for o in header.levels if max(o.width, o.height) <= 64)
-    config = told(site)
+    config = config_of(site)
     assert (
         weight.first_room == weight.page + sizes[config["index"]] + sizes[config["poster"]] + room
     )
