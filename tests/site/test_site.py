@@ -244,7 +244,8 @@ def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> No
     triangles = triangles_of(served.surfaces)
     there = np.ones(served.cell_count, dtype=np.bool_)
     shade(sight, triangles, own_levels(pyramids), there, pyramids.levels, shown)
-    poster = Image.open(io.BytesIO(site.entries[config_of(site)["poster"]].read())).resize((160, 90))
+    picture = site.entries[config_of(site)["poster"]].read()
+    poster = Image.open(io.BytesIO(picture)).resize((160, 90))
     textured = (sight.triangle >= 0) & (triangles.texture[sight.triangle] >= 0)
     assert textured.mean() > 0.2
     off = np.abs(np.asarray(poster, dtype=float).reshape(-1, 3) - shown)[textured]
