@@ -13,8 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import WALKER
 from ptmtools.cells.room_kinds import SpaceKind, space_kinds
@@ -56,7 +58,7 @@ class FloorFinder:
         self._triangle = triangle[order]
         self._start = np.searchsorted(square[order], np.arange(self._side**2 + 1))
 
-    def floor_below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def floor_below(self, points: Floats) -> Floats:
         """(n,) height of the nearest floor at or below each of (n, 3) points, or -inf."""
         heights = np.full(len(points), -np.inf)
         plan = points[:, [0, 2]]
@@ -76,11 +78,11 @@ class FloorFinder:
         np.maximum.at(heights, point[hit], height[hit])
         return heights
 
-    def _square(self, plan: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _square(self, plan: Floats) -> Ints:
         """(n, 2) row and column of the squares of (n, 2) points within the floors' box."""
         extent = np.maximum(self._most - self._least, np.finfo(np.float64).tiny)
         share = (plan - self._least) / extent
-        square: NDArray[np.int64] = (share * self._side).astype(np.int64)
+        square: Ints = (share * self._side).astype(np.int64)
         return np.minimum(np.maximum(square, 0), self._side - 1)
 
 
@@ -95,6 +97,9 @@ _GRID = 7
 _TRIES = 12
 #: A roof is no thicker than this, metres for the default visitor.
 _SLAB = 1.0
+#: Without ceilings, rooms with one have at most this share of the space between walls, and at least
+#: this number of courts are as large as the largest of them.
+_ROOFLESS_SHARE, _ROOFLESS_COURTS = 0.05, 4
 #: A walk may begin in a room with at least this share of the largest floor.
 _AS_LARGE = 0.5
 #: A browser stands on the highest surface around the eye: X_ITE in a square of half that side,
@@ -124,7 +129,7 @@ class Standpoint:
     """
 
     cell: int
-    position: NDArray[np.float64]
+    position: Floats
     yaw: float
     worth: float
     floor: float
@@ -138,7 +143,7 @@ class _Room:
     leaf: int
     rank: int
     floor: float
-    section: NDArray[np.float64]
+    section: Floats
 
 
 def places(
@@ -186,7 +191,7 @@ def _order(room: _Room) -> tuple[int, float, float, int]:
     return room.rank, -float(f"{area(room.section):.3g}"), room.floor, room.leaf
 
 
-def largest_leaves(cells: Cells, count: int, ranks: NDArray[np.int64] | None = None) -> list[int]:
+def largest_leaves(cells: Cells, count: int, ranks: Ints | None = None) -> list[int]:
     """At most ``count`` standing leaves, those of a lower rank of (L,) ``ranks`` first, then by the
     volume of their boxes, a few of each cell."""
     boxes = [np.ptp(cells.leaf_points(i), axis=0).prod() for i in range(cells.leaf_count)]
@@ -203,7 +208,7 @@ def largest_leaves(cells: Cells, count: int, ranks: NDArray[np.int64] | None = N
     return leaves
 
 
-def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArray[np.int64]:
+def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> Ints:
     """(L,) the rank of each leaf: 0 of rooms with a name, else by its `SpaceKind`, roofs after the
     ground; that of leaves that do not stand is meaningless."""
     result = np.zeros(cells.leaf_count, dtype=np.int64)
@@ -230,11 +235,24 @@ def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> NDArr
     floors = around.first(points.reshape(-1, 3), down)[1][:, 1] > 0  # not the ground's underside
     roof = np.isin(kind, (SpaceKind.COURT, SpaceKind.OPEN))
     roof &= floors.reshape(len(leaves), -1).mean(axis=1) > 0.5
+    court = (kind == SpaceKind.COURT) & ~roof
+    if _is_roofless(cells.leaf_cell[leaves], volume * (kind <= SpaceKind.HALL), volume * court):
+        kind[court] = SpaceKind.ROOM
     result[leaves] = 1 + 2 * kind + roof
     return result
 
 
-def _look_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _is_roofless(cell: NDArray[np.int32], room: Floats, court: Floats) -> bool:
+    """Whether a building's model has lost its ceilings, so that its rooms seem courts: some are as
+    large as the largest room, and rooms hold next to nothing, such as the cabin of a lift.
+    ``cell``, ``room``, ``court``: (n,) of each leaf, and its volume if it is one."""
+    rooms, courts = np.bincount(cell, room), np.bincount(cell, court)
+    as_large = np.count_nonzero(courts >= max(rooms.max(), np.finfo(np.float64).tiny))
+    few = room.sum() <= _ROOFLESS_SHARE * (room.sum() + court.sum())
+    return bool(few and as_large >= _ROOFLESS_COURTS)
+
+
+def _look_points(points: Floats) -> Floats:
     """(5, 3) points in a convex body with these corners: its middle, and half the way from there to
     its ends along x and z."""
     middle = points.mean(axis=0)
@@ -265,7 +283,8 @@ def _place_in(
     least, greatest = room.section.min(axis=0), room.section.max(axis=0)
     near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= greatest)).all(axis=1)
     sides = np.stack([room.section, np.roll(room.section, -1, axis=0)], axis=1)
-    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, sides))
+    around = shapely.multilinestrings(np.concatenate([walls[near], sides]))
+    clearance = shapely.distance(shapely.points(grid), around)
     grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
     position = np.insert(grid, 1, room.floor + eye, axis=1)
     floor = ground.floor_below(position)
@@ -283,9 +302,7 @@ def _place_in(
     return Standpoint(cell, position[i], view.yaw, view.worth, float(floor[i]))
 
 
-def _level(
-    position: NDArray[np.float64], floor: NDArray[np.float64], ground: FloorFinder, radius: float
-) -> NDArray[np.bool_]:
+def _level(position: Floats, floor: Floats, ground: FloorFinder, radius: float) -> Bools:
     """(n,) whether no floor around (n, 3) positions lies above the one at the position itself."""
     around = np.repeat(position[:, None], len(_AROUND), axis=1)
     around[..., [0, 2]] += radius * _AROUND
@@ -293,7 +310,7 @@ def _level(
     return np.asarray((height < floor[:, None] + _LIFT).all(axis=1))
 
 
-def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+def _grid(polygon: Floats) -> Floats:
     """(n, 2) points of a regular grid that lie inside a convex counter-clockwise polygon."""
     share = (np.arange(_GRID) + 0.5) / _GRID
     least, greatest = polygon.min(axis=0), polygon.max(axis=0)
@@ -302,16 +319,5 @@ def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     a, b = polygon, np.roll(polygon, -1, axis=0)
     edge, to = b - a, points[:, None] - a
     inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
-    inner: NDArray[np.float64] = points[inside]
+    inner: Floats = points[inside]
     return inner if len(inner) else polygon.mean(axis=0)[None]
-
-
-def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) distance of each (n, 2) point to the nearest of (m, 2, 2) segments; inf if none."""
-    a, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
-    to = points[:, None] - a
-    share = np.clip((to * along).sum(axis=2) / length, 0, 1)
-    off = share[..., None] * along - to
-    nearest: NDArray[np.float64] = np.sqrt((off**2).sum(axis=2)).min(axis=1, initial=np.inf)
-    return nearest

@@ -148,6 +148,20 @@ def test_a_walk_begins_on_the_lowest_of_equal_storeys(room_row) -> None:
         assert views[0].position[1] == 1.6
 
 
+@pytest.mark.parametrize(("rooms", "first"), [(24, 0), (4, 3)], ids=["cabin", "court"])
+def test_rooms_that_lost_their_ceilings_come_before_a_cabin(room_row, rooms, first) -> None:
+    """Only the last room of the row has a ceiling: a lift's cabin in a building without them, but
+    the room of a small house with courts."""
+    scene, cells = room_row(rooms)
+    kept = np.ones(len(scene.triangles), dtype=bool)
+    for ceiling in range(1, 4 * (rooms - 1), 4):
+        kept[2 * ceiling : 2 * ceiling + 2] = False
+    fields = ("triangles", "uv", "triangle_object", "triangle_material", "two_sided")
+    open_above = replace(scene, **{name: getattr(scene, name)[kept] for name in fields})
+    views, _ = place_viewpoints(open_above, cells, EmitOptions())
+    assert views[0].cell == first
+
+
 @pytest.mark.parametrize(
     ("named", "called"),
     [
