@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.output.emitter import Emitter
@@ -173,15 +173,15 @@ class Content:
         return TexturePlaces(self.textures)
 
     @cached_property
-    def paint(self) -> NDArray[np.int64]:
+    def paint(self) -> Ints:
         """(S,) the index of each shape's texture in `textures`; -1 for none."""
         of_image, materials = self.places.of_image, self.scene.materials
         place = [of_image[m.image][0] if m.image >= 0 else -1 for m in materials]
-        paint: NDArray[np.int64] = np.array(place, dtype=np.int64)[self.geometry.material]
+        paint: Ints = np.array(place, dtype=np.int64)[self.geometry.material]
         return paint
 
     @cached_property
-    def cell_textures(self) -> list[NDArray[np.int64]]:
+    def cell_textures(self) -> list[Ints]:
         """For each cell the indices of its textures in `textures`, ascending."""
         start, places = self.geometry.cell_start[1:-1], self.places
         of_shapes = np.split(self.paint, start)
@@ -202,6 +202,6 @@ class Content:
         return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]
 
 
-def _lamp_radiance(material: Material, shine: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lamp_radiance(material: Material, shine: Floats) -> Floats:
     """(3,) the radiance of a lamp: that which it sends, but no less than its colour."""
     return np.maximum(to_linear(np.array(material.color)), shine)

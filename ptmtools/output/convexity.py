@@ -38,7 +38,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, cross, normals, polygon_planes
+from ptmtools.arrays import Bools, Floats, Ints, Singles, cross, normals, polygon_planes
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import coordinates, row_texts
@@ -55,9 +55,7 @@ def slack_of(cells: Cells) -> float:
     return SLACK_SHARE * Tolerance.for_points(cells.leaf_point).plane
 
 
-def hull_rows(
-    points: NDArray[np.float32], triangles: NDArray[np.integer], slack: float
-) -> list[str]:
+def hull_rows(points: Singles, triangles: NDArray[np.integer], slack: float) -> list[str]:
     """The text of each vertex of a convex hull: the shortest decimals if the hull is convex in them
     within ``slack`` metres, else float64's, which are the float32 numbers themselves.
 
@@ -160,7 +158,7 @@ def _units(corners: Floats) -> Floats:
 
 def _may_be_concave(
     readings: Floats, start: NDArray[np.integer], normal: Floats, slack: float
-) -> NDArray[np.bool_]:
+) -> Bools:
     """(K,) whether a polygon of the (r, Q, 3) points may have a corner more than ``slack`` outside
     of an edge: no corner turns inwards so far that all of them together could cause it."""
     size = np.diff(start)
@@ -217,7 +215,7 @@ _DIRECTIONS = np.array(
 )
 
 
-def convex_hull(points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def convex_hull(points: Singles) -> tuple[Singles, NDArray[np.int32]]:
     """The hull of (n, 3) points.
 
     Returns (points, triangles): the (h, 3) vertices of the hull in lexical order, and (f, 3)
@@ -240,7 +238,7 @@ def convex_hull(points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArr
     return distinct, triangles[order]
 
 
-def _whole(points: NDArray[np.float32]) -> list[_Whole]:
+def _whole(points: Singles) -> list[_Whole]:
     """The points as integers, all of them with the same scale."""
     ratios = [x.as_integer_ratio() for x in points.ravel().tolist()]
     scale = max((denominator for _, denominator in ratios), default=1)
@@ -285,7 +283,7 @@ def _tetrahedron(points: list[_Whole]) -> list[_Face]:
     return [_face(points, *f) for f in ((a, b, c), (b, a, d), (c, b, d), (a, c, d))]
 
 
-def _extreme(faces: list[_Face]) -> NDArray[np.int64]:
+def _extreme(faces: list[_Face]) -> Ints:
     """The true corners: vertices around which the normals span space."""
     normals: dict[int, list[_Whole]] = {}
     for face in faces:
@@ -294,7 +292,7 @@ def _extreme(faces: list[_Face]) -> NDArray[np.int64]:
     return np.array(sorted(v for v, around in normals.items() if _spans(around)), dtype=np.int64)
 
 
-def _outer(points: NDArray[np.float32]) -> NDArray[np.float32]:
+def _outer(points: Singles) -> Singles:
     """The points without those that certainly lie inside the hull of the outermost ones."""
     place = points.astype(np.float64)
     height = place @ _DIRECTIONS.T

@@ -26,9 +26,8 @@ from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError
@@ -152,9 +151,7 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> VisitCost:
 SHARES = (0.9, 0.99)
 
 
-def _until_shares(
-    content: Content, geometry: NDArray[np.int64], paints: Bools, whole: NDArray[np.int64]
-) -> Floats:
+def _until_shares(content: Content, geometry: Ints, paints: Bools, whole: Ints) -> Floats:
     """(C, 2) bytes, with their textures, of the cell itself and of the fewest others that cover
     each of `SHARES` of the average view of a cell.
 
@@ -179,13 +176,13 @@ def finest_bytes(record: TextureRecord) -> int:
     return record.levels[-1].end + image
 
 
-def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:
+def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> Ints:
     """(C,) bytes of the cells in a form, with all objects as modelled."""
     paths = (path_of(cell, form.cell_files) for cell in range(content.cells.cell_count))
     return np.array([sizes[path] for path in paths], np.int64) + _meshes(content, form, sizes)
 
 
-def _meshes(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:
+def _meshes(content: Content, form: Emitter, sizes: Mapping[str, int]) -> Ints:
     """(C,) of these, bytes of objects that have levels of detail."""
     finest = np.zeros(content.cells.cell_count, np.int64)
     for mesh in content.meshes if form.has_meshes else ():

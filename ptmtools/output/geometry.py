@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, areas, normals, sum_by_group, units
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, normals, sum_by_group, units
 from ptmtools.cells.model import Cells
 from ptmtools.errors import DatabaseError
 from ptmtools.output.numbers import single
@@ -65,14 +65,14 @@ class Shape:
     object: int
     material: int
     two_sided: bool
-    point: NDArray[np.int64]
-    uv: NDArray[np.int64]
-    triangle: NDArray[np.int64]
-    uv_triangle: NDArray[np.int64]
+    point: Ints
+    uv: Ints
+    triangle: Ints
+    uv_triangle: Ints
     color: NDArray[np.uint8] | None = None
-    light: NDArray[np.float32] | None = None
-    relief: NDArray[np.float32] | None = None
-    normal: NDArray[np.float32] | None = None
+    light: Singles | None = None
+    relief: Singles | None = None
+    normal: Singles | None = None
     lit: bool = False
     reflects: bool = False
     normals: NDArray[np.int8] | None = None
@@ -105,9 +105,9 @@ class Geometry:
 
     light: Light | None = None
     normals: NDArray[np.int8] | None = None
-    curved: NDArray[np.bool_]
-    relief: NDArray[np.float32] | None = None
-    relieved: NDArray[np.bool_]
+    curved: Bools
+    relief: Singles | None = None
+    relieved: Bools
 
     def __init__(self, scene: Scene, cells: Cells) -> None:
         piece, cell = cells.emitted(scene.two_sided)
@@ -205,7 +205,7 @@ class Geometry:
         result.normals[rows] = normal_steps(_carry_over(scene, cells, self.piece[rows], value))
         return result
 
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(S,) m² of each shape."""
         count = np.diff(self.triangle_start)
         first = np.repeat(self.point_start[:-1], count)[:, None]
@@ -251,9 +251,7 @@ def _corner_colors(
     return np.asarray(np.clip(np.rint(interpolated), 0, 255).astype(np.uint8))
 
 
-def _normal_coordinates(
-    scene: Scene, cells: Cells, piece: NDArray[np.integer]
-) -> NDArray[np.float32] | None:
+def _normal_coordinates(scene: Scene, cells: Cells, piece: NDArray[np.integer]) -> Singles | None:
     """(M, 3, 2) the coordinates of pieces' corners in the normal maps that have their own."""
     if scene.normal_uv is None:
         return None
@@ -263,7 +261,7 @@ def _normal_coordinates(
 
 def _carry_over(
     scene: Scene, cells: Cells, piece: NDArray[np.integer], values: NDArray[Any]
-) -> NDArray[np.float64]:
+) -> Floats:
     """(M, 3, k) at the corners of pieces, interpolated between the (T, 3, k) values of the corners
     of the scene's triangles."""
     source = cells.triangle_source[piece]
@@ -303,7 +301,7 @@ def smooth_normals(corner: NDArray[np.floating], group: NDArray[np.integer]) -> 
     return units(total)[row].reshape(-1, 3, 3)
 
 
-def bends(corner: Floats, normal: Floats) -> NDArray[np.bool_]:
+def bends(corner: Floats, normal: Floats) -> Bools:
     """(T,) whether the (T, 3, 3) normals of the corners of triangles are others than their own."""
     apart = np.abs(normal - units(normals(corner))[:, None]).max(axis=(1, 2))
     return np.asarray(NORMAL_STEPS * apart > 0.5)
@@ -316,9 +314,7 @@ def normal_steps(normal: Floats) -> NDArray[np.int8]:
     return np.asarray(np.rint(NORMAL_STEPS * unit), np.int8)
 
 
-def _index_rows(
-    corner: NDArray[np.int64], shape: NDArray[np.int64], shapes: int, count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _index_rows(corner: Ints, shape: Ints, shapes: int, count: int) -> tuple[Ints, Ints, Ints]:
     """The rows used by the triangles of each shape, the start of each shape among them, and the
     (m, 3) corners as indices into them, counted from the shape's first."""
     used, place = np.unique(shape[:, None] * count + corner, return_inverse=True)
@@ -326,7 +322,7 @@ def _index_rows(
     return used % max(count, 1), start, place.reshape(-1, 3) - start[shape][:, None]
 
 
-def _weld(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _weld(rows: Singles) -> tuple[Singles, Ints]:
     """The distinct rows of (n, 2 or more) in lexical order, and the place of each row among them.
 
     Floats become integers of the same order, two of which are sorted as one.

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Ints, Singles
 from ptmtools.glb import BYTE, FLOAT, INT, NARROW, QUANTIZATION, SHORT
 from ptmtools.meshopt.encoding import (
     encode_attributes,
@@ -73,15 +74,15 @@ class _BufferPart:
 
     primitive: dict[str, Any]
     material: int
-    step: NDArray[np.int64]
-    exponent: NDArray[np.int64]
+    step: Ints
+    exponent: Ints
     textured: bool
     lit: bool
     both: bool
-    frame: NDArray[np.int64] | None
+    frame: Ints | None
     color: NDArray[np.uint16] | None
     normals: NDArray[np.int8] | None
-    triangle: NDArray[np.int64]
+    triangle: Ints
 
     @property
     def kind(self) -> tuple[bool, ...]:
@@ -271,6 +272,6 @@ class CompressedBuffer:
         return b"".join(self._streams)
 
 
-def _steps(values: NDArray[np.float32], exponent: NDArray[np.int64]) -> NDArray[np.int64]:
+def _steps(values: Singles, exponent: Ints) -> Ints:
     """Coordinates in whole steps."""
     return np.rint(values.astype(np.float64) * 2.0 ** -exponent.astype(np.float64)).astype(np.int64)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.glb import BYTE, COMPONENTS, ITEMS, QUANTIZATION, elements, meaning
 from ptmtools.meshopt.decoding import decode
 from ptmtools.output.gltf import WHITE, WRAPS, unpack
@@ -97,15 +98,15 @@ class ReadPrimitive:
     place: str
     object: str
     extras: Mapping[str, int]
-    point: NDArray[np.float32]
-    uv: NDArray[np.float32] | None
-    color: NDArray[np.float64] | None
-    triangle: NDArray[np.int64]
+    point: Singles
+    uv: Singles | None
+    color: Floats | None
+    triangle: Ints
     material: ReadMaterial
-    light: NDArray[np.float32] | None = None
-    frame: NDArray[np.float32] | None = None
-    normal: NDArray[np.float32] | None = None
-    normals: NDArray[np.float32] | None = None
+    light: Singles | None = None
+    frame: Singles | None = None
+    normal: Singles | None = None
+    normals: Singles | None = None
 
 
 @dataclass(frozen=True)
@@ -239,7 +240,7 @@ class _GlbReader:
 
     def _rows(
         self, attributes: dict[str, int], name: str, form: str, count: int, place: str
-    ) -> NDArray[np.float32] | None:
+    ) -> Singles | None:
         if name not in attributes:
             return None
         rows = self._vertices(attributes[name], form)
@@ -247,9 +248,7 @@ class _GlbReader:
             _foreign(place, f"{len(rows)} rows of {name} for {count} positions")
         return rows
 
-    def _normals(
-        self, attributes: dict[str, int], count: int, place: str
-    ) -> NDArray[np.float32] | None:
+    def _normals(self, attributes: dict[str, int], count: int, place: str) -> Singles | None:
         """Those of bytes; None without, and for those of floats, which belong to frames."""
         index = attributes.get("NORMAL")
         if index is None or self._row("accessors", index)["componentType"] != BYTE:
@@ -264,9 +263,7 @@ class _GlbReader:
             _foreign(place, f"{len(rows)} normals for {count} positions, or of another length")
         return normals.astype(np.float32)
 
-    def _frames(
-        self, attributes: dict[str, int], count: int, place: str
-    ) -> NDArray[np.float32] | None:
+    def _frames(self, attributes: dict[str, int], count: int, place: str) -> Singles | None:
         normal = self._rows(attributes, "NORMAL", "VEC3", count, place)
         tangent = self._rows(attributes, "TANGENT", "VEC4", count, place)
         if normal is None or tangent is None:
@@ -277,9 +274,7 @@ class _GlbReader:
             _foreign(place, "a bitangent has no sign")
         return np.hstack([normal, tangent])
 
-    def _colors(
-        self, attributes: dict[str, int], count: int, place: str
-    ) -> NDArray[np.float64] | None:
+    def _colors(self, attributes: dict[str, int], count: int, place: str) -> Floats | None:
         if "COLOR_0" not in attributes:
             return None
         index = attributes["COLOR_0"]
@@ -289,7 +284,7 @@ class _GlbReader:
             _foreign(place, f"{len(rows)} colours for {count} positions, or other than opaque ones")
         return meaning(rows[:, :3], normalized=True)
 
-    def _vertices(self, index: int, form: str) -> NDArray[np.float32]:
+    def _vertices(self, index: int, form: str) -> Singles:
         rows = self._elements(index, form, (_FLOAT,), _VERTICES)
         if not np.isfinite(rows).all():
             raise FileError("PTM-D731", f"accessors[{index}]", "a number is not finite")
@@ -348,7 +343,7 @@ class _GlbReader:
         self._views[index] = layout, data
         return layout, data
 
-    def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
+    def _check_bounds(self, index: int, point: Singles) -> None:
         place, accessor = f"accessors[{index}]", self._tree["accessors"][index]
         for name, actual in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
             if name not in accessor:

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Ints, Singles
 from ptmtools.glb import BYTE, COMPONENTS, FLOAT, INT, ITEMS, QUANTIZATION, SHORT, BufferWriter
 from ptmtools.meshopt.encoding import by_first_use
 from ptmtools.output.geometry import Shape
@@ -26,10 +27,10 @@ class VertexTables(Protocol):
     """
 
     @property
-    def point(self) -> NDArray[np.float32]: ...
+    def point(self) -> Singles: ...
 
     @property
-    def uv(self) -> NDArray[np.float32]: ...
+    def uv(self) -> Singles: ...
 
 
 @dataclass(frozen=True)
@@ -49,13 +50,13 @@ class Vertices:
     normals: (n, 3) int8 as in `Shape`, or None.
     """
 
-    point: NDArray[np.float32]
-    uv: NDArray[np.float32] | None
+    point: Singles
+    uv: Singles | None
     color: NDArray[np.uint16] | None
-    triangle: NDArray[np.int64]
-    light: NDArray[np.float32] | None = None
-    frame: NDArray[np.float32] | None = None
-    normal: NDArray[np.float32] | None = None
+    triangle: Ints
+    light: Singles | None = None
+    frame: Singles | None = None
+    normal: Singles | None = None
     normals: NDArray[np.int8] | None = None
 
 
@@ -99,14 +100,14 @@ def vertices_of(tables: VertexTables, shape: Shape, *, textured: bool) -> Vertic
     return Vertices(point, uv, rgba, triangle, light, frame, normal, normals)
 
 
-def flip_v(uv: NDArray[np.floating]) -> NDArray[np.float32]:
+def flip_v(uv: NDArray[np.floating]) -> Singles:
     """Texture coordinates with the origin at the upper left instead of the lower, or back."""
     turned = np.array(uv, dtype=np.float64)
     turned[..., 1] = 1 - turned[..., 1]
     return turned.astype(np.float32)
 
 
-def shortest(values: NDArray[np.float32]) -> list[float]:
+def shortest(values: Singles) -> list[float]:
     """The shortest numbers in JSON that read back to the same float32."""
     numbers = [float(str(value)) for value in values]
     return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in numbers]
@@ -183,7 +184,7 @@ class PlainBuffer(BufferWriter):
             self._targets[kind] = target
         return place
 
-    def _numbers(self, values: NDArray[np.float32]) -> list[float]:
+    def _numbers(self, values: Singles) -> list[float]:
         return shortest(values)
 
     def members(self) -> dict[str, Any]:

@@ -24,7 +24,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import areas, normals
+from ptmtools.arrays import Floats, areas, normals
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
@@ -67,7 +67,7 @@ def _least(largest: float) -> int:
     return math.ceil(math.log2(max(largest / MOST, 2.0**_FINEST)))
 
 
-def least_thickness(corners: NDArray[np.float64], tolerance: Tolerance) -> float:
+def least_thickness(corners: Floats, tolerance: Tolerance) -> float:
     """Least distance of parallel (n, 3, 3) triangles that face each other or turn their backs,
     metres; at most that for the coarsest step. Nearer ones than ``tolerance.plane`` are one."""
     limit = _IN_THICKNESS * 2.0**COARSEST

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.output.convexity import leaf_numbers, portal_polygons, slack_of
 from ptmtools.output.model import PreviewRecord, TextureRecord, Viewpoint
@@ -194,7 +194,7 @@ def _boxes(content: Content) -> list[Any]:
     return [[int(v) if v.is_integer() else v for v in row] for row in (rounded + 0.0).tolist()]
 
 
-def _round_down(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
+def _round_down(values: Floats, decimals: int) -> Floats:
     """To a whole multiple of 10 ** -decimals, not above the value."""
     step = 10.0**-decimals
     lower = np.round(np.floor(values / step) * step, decimals)

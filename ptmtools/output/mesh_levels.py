@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Ints
+from ptmtools.arrays import Ints, Singles
 from ptmtools.output.geometry import Geometry, Shape, normal_steps, smooth_normals
 from ptmtools.progress import Progress, silent
 
@@ -51,8 +51,8 @@ class DetailLevel:
     error: `Simplified.error` with those of all finer levels, metres.
     """
 
-    point: NDArray[np.float32]
-    uv: NDArray[np.float32]
+    point: Singles
+    uv: Singles
     shapes: tuple[Shape, ...]
     error: float
 
@@ -71,7 +71,7 @@ class MeshLevels:
 
     cell: int
     object: int
-    box: NDArray[np.float32]
+    box: Singles
     levels: tuple[DetailLevel, ...]
     first: int
 

@@ -25,6 +25,7 @@ import numpy as np
 import orjson
 from numpy.typing import ArrayLike, NDArray
 
+from ptmtools.arrays import Floats, Singles
 from ptmtools.errors import DatabaseError
 
 #: Whole numbers below this are exact; greater ones may end in zeros as decimals only.
@@ -34,7 +35,7 @@ _THOUSAND, _SMALL = 1000, np.float32(0.01)
 _PARTS = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e([-+]\d+))?")
 
 
-def single(values: ArrayLike, name: str) -> NDArray[np.float32]:
+def single(values: ArrayLike, name: str) -> Singles:
     """``values`` rounded to float32, without negative zeros.
 
     Raises DatabaseError: PTM-D601 if one is not finite there; ``name`` says which values.
@@ -143,7 +144,7 @@ def significant(values: NDArray[np.floating], digits: int = DIGITS) -> list[floa
     return [None if v != v else _short(v, digits) for v in values.tolist()]
 
 
-def shares_of(row: NDArray[np.float64]) -> list[float]:
+def shares_of(row: Floats) -> list[float]:
     """The shares of a cell with `DIGITS` significant digits; the greatest has as many as make
     the sum 1 within 1e-9.
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, Singles
 from ptmtools.scene.model import Scene
 from ptmtools.store.archive import Stored
 
@@ -32,8 +32,8 @@ class ObjectMaps:
 
     objects: NDArray[np.int32]
     side: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    frame: NDArray[np.float32]
+    uv: Singles
+    frame: Singles
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The maps as plain arrays."""
@@ -74,7 +74,7 @@ class ObjectMaps:
         )
 
 
-def frame_axes(frame: NDArray[np.float32]) -> Floats:
+def frame_axes(frame: Singles) -> Floats:
     """(n, 3, 3) tangent, bitangent and normal, as columns, of (n, 7) frames."""
     normal, tangent = frame[:, :3].astype(np.float64), frame[:, 3:6].astype(np.float64)
     bitangent = np.cross(normal, tangent) * frame[:, 6:]

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.model import Cells
@@ -229,7 +228,7 @@ class _Plan:
             self._colour_bar(figure, place, shades)
         return figure
 
-    def _to_paper(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _to_paper(self, plan: Floats) -> Floats:
         """(…, 2) plan coordinates (x, z) as (right, down) on paper."""
         return np.stack([plan[..., 1], -plan[..., 0]], axis=-1) if self._turned else plan
 
@@ -272,7 +271,7 @@ class _Plan:
             parse_math=False,  # a name may have dollar signs
         )
 
-    def _sections(self, height: float) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    def _sections(self, height: float) -> Iterator[tuple[int, Floats]]:
         for leaf in range(self._cells.leaf_count):
             cell = int(self._cells.leaf_cell[leaf])
             polygon = leaf_section(self._cells, leaf, height)
@@ -284,7 +283,7 @@ class _Plan:
         ends = self._cells.portal_cell
         return np.flatnonzero((ends[:, 0] != ends[:, 1]) & (ends >= 0).all(axis=1)).tolist()
 
-    def _portals(self, height: float) -> list[NDArray[np.float64]]:
+    def _portals(self, height: float) -> list[Floats]:
         cuts = (polygon_section(self._cells.portal(k), height) for k in self._doors())
         return [cut for cut in cuts if cut is not None]
 
@@ -294,15 +293,13 @@ class _Plan:
         share = self._shade.get(cell)
         return _UNSEEN if share is None else shades.to_rgba(max(share, _FAINTEST))
 
-    def _numbers(
-        self, axis: Any, sections: list[tuple[int, NDArray[np.float64]]], points: float
-    ) -> None:
+    def _numbers(self, axis: Any, sections: list[tuple[int, Floats]], points: float) -> None:
         """Writes each cell's number once, in its largest section, if there is room, and below it,
         in the largest section of a named room, the name; ``points`` of paper are a metre."""
         import shapely
         from matplotlib.patheffects import withStroke
 
-        largest: dict[int, NDArray[np.float64]] = {}
+        largest: dict[int, Floats] = {}
         for cell, polygon in sections:
             if cell not in largest or area(polygon) > area(largest[cell]):
                 largest[cell] = polygon
@@ -454,14 +451,14 @@ def _letters(text: str, width: float, depth: float) -> float:
 
 
 def _outlines(
-    sections: Sequence[tuple[int, NDArray[np.float64]]], grid: float
-) -> dict[int | None, list[NDArray[np.float64]]]:
+    sections: Sequence[tuple[int, Floats]], grid: float
+) -> dict[int | None, list[Floats]]:
     """Cell → closed lines around the union of the sections of its leaves."""
     import shapely
 
     from ptmtools.cells.planar import union
 
-    outlines: dict[int | None, list[NDArray[np.float64]]] = {}
+    outlines: dict[int | None, list[Floats]] = {}
     for cell in sorted({cell for cell, _ in sections}):
         leaves = [shapely.Polygon(polygon) for number, polygon in sections if number == cell]
         rim = shapely.boundary(union(np.array(leaves), grid) if len(leaves) > 1 else leaves[0])

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.output.storeys import storey_of
 from ptmtools.visibility.model import Pvs
@@ -17,11 +17,11 @@ VIEW_ONLY, LEFT_OUT = ("#8fa3b1", "...."), ("#b5452c", "////")
 #: A floor may be this far below that of its storey, metres, as floors are not quite level.
 _SLACK = 0.5
 
-Shown = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Shown = Callable[[Floats], Floats]
 
 
 def draw_view_only(
-    axis: Any, cells: Cells, sections: Sequence[tuple[int, NDArray[np.float64]]], shown: Shown
+    axis: Any, cells: Cells, sections: Sequence[tuple[int, Floats]], shown: Shown
 ) -> None:
     """Dots the view-only cells among ``sections``: numbers, and (n, 2) polygons, x and z.
 
@@ -44,9 +44,7 @@ def draw_left_out(
     _hatch(axis, list(shown(cells.left_out[inside][:, :, [0, 2]])), LEFT_OUT, zorder=6)
 
 
-def _hatch(
-    axis: Any, polygons: Sequence[NDArray[np.float64]], style: tuple[str, str], zorder: float
-) -> None:
+def _hatch(axis: Any, polygons: Sequence[Floats], style: tuple[str, str], zorder: float) -> None:
     from matplotlib.collections import PolyCollection
 
     colour, pattern = style
@@ -92,7 +90,7 @@ def draw_leaks(
     leaks: dict[int, list[int]],
     floors: Sequence[float],
     storey: int,
-    shown: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    shown: Callable[[Floats], Floats],
 ) -> None:
     """Draws a ring around each leak of one storey, with the cells that see too much through it. A
     leak belongs to the nearest floor below.

@@ -15,9 +15,9 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.arrays import Ints
 from ptmtools.errors import DatabaseError, Rebuild
 from ptmtools.files import open_regular
 from ptmtools.output.gltf_reader import ReadGlb, read_glb
@@ -59,8 +59,8 @@ class Served:
     statistics: Document
     index_bytes: int
     statistics_bytes: int
-    record_bytes: NDArray[np.int64]
-    geometry_bytes: NDArray[np.int64]
+    record_bytes: Ints
+    geometry_bytes: Ints
     mesh_bytes: tuple[tuple[int, ...], ...]
     surfaces: Surfaces
     locator: Locator

@@ -14,12 +14,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 
 
-def triangle_section(corners: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+def triangle_section(corners: Floats, height: float) -> Floats:
     """(m, 2, 2) segments in which (n, 3, 3) triangles meet the plane; horizontal ones have none."""
     above = corners[:, :, 1] >= height
     lone = above.sum(axis=1)
@@ -33,7 +33,7 @@ def triangle_section(corners: NDArray[np.float64], height: float) -> NDArray[np.
     return np.stack(ends, axis=1)
 
 
-def polygon_section(polygon: NDArray[np.float64], height: float) -> NDArray[np.float64] | None:
+def polygon_section(polygon: Floats, height: float) -> Floats | None:
     """(2, 2) segment in which a convex (n, 3) polygon meets the plane, or None."""
     following = np.roll(polygon, -1, axis=0)
     change = (polygon[:, 1] >= height) != (following[:, 1] >= height)
@@ -42,7 +42,7 @@ def polygon_section(polygon: NDArray[np.float64], height: float) -> NDArray[np.f
     return _crossing(polygon[change], following[change], height)
 
 
-def leaf_section(cells: Cells, leaf: int, height: float) -> NDArray[np.float64]:
+def leaf_section(cells: Cells, leaf: int, height: float) -> Floats:
     """(n, 2) convex polygon in which a leaf meets the plane, counter-clockwise in (x, z); (0, 2)
     if it does not."""
     points = cells.leaf_points(leaf)
@@ -64,7 +64,7 @@ def leaf_section(cells: Cells, leaf: int, height: float) -> NDArray[np.float64]:
     return corners[around]
 
 
-def area(polygon: NDArray[np.float64]) -> float:
+def area(polygon: Floats) -> float:
     """m² of a (n, 2) polygon, positive if counter-clockwise."""
     if len(polygon) < 3:
         return 0.0
@@ -72,7 +72,7 @@ def area(polygon: NDArray[np.float64]) -> float:
     return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
 
 
-def _crossing(a: NDArray[np.float64], b: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+def _crossing(a: Floats, b: Floats, height: float) -> Floats:
     """(n, 2) where the segments from ``a`` to ``b``, with ends on both sides, meet the plane."""
     share = (height - a[:, 1]) / (b[:, 1] - a[:, 1])
     return (a + share[:, None] * (b - a))[:, [0, 2]]

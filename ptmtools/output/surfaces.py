@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.arrays import Bools, Floats, Ints, Singles, normals
 from ptmtools.output.gltf import WRAPS
 from ptmtools.output.gltf_reader import ReadGlb, ReadMaterial, ReadPrimitive
 from ptmtools.output.locating import SLACK, Locator
@@ -37,7 +37,7 @@ class MappedRelief:
 
     number: NDArray[np.int32]
     uv: Floats
-    frame: NDArray[np.float32]
+    frame: Singles
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Surfaces:
     relief: MappedRelief | None = None
     bumps: Bumps | None = None
     gloss: Gloss | None = None
-    normals: NDArray[np.float32] | None = None
+    normals: Singles | None = None
     vertex_colors: Floats | None = None
     opacity: Floats | None = None
     transparent: Bools | None = None
@@ -274,7 +274,7 @@ def _gloss(materials: list[ReadMaterial], count: list[int]) -> Gloss | None:
     return Gloss(np.repeat(probe, count), *np.repeat(finish, count, axis=0).T)
 
 
-def _normals(shapes: list[ReadPrimitive]) -> NDArray[np.float32] | None:
+def _normals(shapes: list[ReadPrimitive]) -> Singles | None:
     if all(p.normals is None for p in shapes):
         return None
     return np.concatenate(
@@ -329,6 +329,6 @@ def _blends(shape: ReadPrimitive) -> bool:
     return shape.material.blends and shape.material.cutoff is None
 
 
-def corners_of(uv: NDArray[np.float32] | None, triangle: Ints) -> Floats:
+def corners_of(uv: Singles | None, triangle: Ints) -> Floats:
     """(m, 3, 2) coordinates of the corners of triangles; 0 without."""
     return np.zeros((len(triangle), 3, 2)) if uv is None else uv.astype(np.float64)[triangle]

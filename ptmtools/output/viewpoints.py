@@ -19,8 +19,8 @@ from dataclasses import replace
 from heapq import heappop, heappush
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions, storey_name
@@ -135,7 +135,7 @@ def place_viewpoints(
     return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(initial)), tuple(notes)
 
 
-def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, float]:
+def orientation(direction: Floats) -> tuple[float, float, float, float]:
     """(x, y, z, angle): the rotation that turns -Z to ``direction`` and keeps Y as far up as it
     can; a vertical direction keeps X to the right."""
     back = -direction / np.linalg.norm(direction)
@@ -168,8 +168,8 @@ def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, fl
 
 def _viewpoint(
     description: str,
-    position: NDArray[np.float64],
-    direction: NDArray[np.float64],
+    position: Floats,
+    direction: Floats,
     field_of_view: float,
     cell: int,
 ) -> Viewpoint:
@@ -181,13 +181,13 @@ def _viewpoint(
     return Viewpoint("", description, (x, y, z), (dx, dy, dz), turn, field_of_view, cell)
 
 
-def _heading(yaw: float) -> NDArray[np.float64]:
+def _heading(yaw: float) -> Floats:
     return np.array([-np.sin(yaw), 0.0, -np.cos(yaw)])
 
 
 def _standing(
-    cells: Cells, ground: FloorFinder, position: NDArray[np.float64], options: WriterOptions
-) -> tuple[NDArray[np.float64], int]:
+    cells: Cells, ground: FloorFinder, position: Floats, options: WriterOptions
+) -> tuple[Floats, int]:
     """A place to stand at a position, and its cell, -1 for none; on the floor below if that is
     within reach."""
     eye = options.avatar(cells.walker)[1]
@@ -200,7 +200,7 @@ def _standing(
     return position, _cell_to_stand_in(cells, position)
 
 
-def _cell_to_stand_in(cells: Cells, position: NDArray[np.float64]) -> int:
+def _cell_to_stand_in(cells: Cells, position: Floats) -> int:
     """The cell of the standing leaf at a position, -1 for none."""
     leaf = int(cells.locate_leaf(position)[0])
     return int(cells.leaf_cell[leaf]) if leaf >= 0 and cells.leaf_standing[leaf] else -1

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import normals
+from ptmtools.arrays import Floats, Ints, Singles, normals
 from ptmtools.embree import ray_tree
 from ptmtools.output.model import TextureRecord
 from ptmtools.output.storeys import triangle_section
@@ -96,7 +96,7 @@ class Panoramas:
         self._local = self._normalise(corners)
         self._tree: Any = None
 
-    def worth(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def worth(self, places: Floats) -> Floats:
         """(n, DIRECTIONS) worth of the views from (n, 3) places; 0 where most of the view is near
         or empty."""
         worth = np.zeros((len(places), DIRECTIONS))
@@ -131,9 +131,7 @@ class Panoramas:
         np.add.at(worth, place, value)
         return np.where(free >= 0.5, worth * free, 0.0)
 
-    def _cast(
-        self, origin: NDArray[np.float64], way: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _cast(self, origin: Floats, way: Floats) -> tuple[Ints, Floats]:
         """(k,) the first triangle that each of (k, 3) rays hits, or -1, and (k,) its distance in
         lengths of ``way``."""
         if self._tree is None:
@@ -142,12 +140,12 @@ class Panoramas:
         distance = hits["tfar"].astype(np.float64) / self._scale
         return hits["primID"].astype(np.int64), distance
 
-    def _normalise(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
-        local: NDArray[np.float32] = ((points - self._middle) * self._scale).astype(np.float32)
+    def _normalise(self, points: Floats) -> Singles:
+        local: Singles = ((points - self._middle) * self._scale).astype(np.float32)
         return local
 
 
-def _sectors(columns: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def _sectors(columns: NDArray[np.floating[Any]]) -> Floats:
     """(n, DIRECTIONS) sums over the columns that a view in each direction has, of (n, _COLUMNS)."""
     around = np.concatenate([columns[:, -_ACROSS:], columns, columns[:, :_ACROSS]], axis=1)
     sums = np.cumsum(np.insert(around, 0, 0.0, axis=1), axis=1)
@@ -192,12 +190,12 @@ class Outlook:
     """
 
     def __init__(self, scene: Scene, textures: Sequence[TextureRecord]) -> None:
-        self.walls: Callable[[float], NDArray[np.float64]] = cache(
+        self.walls: Callable[[float], Floats] = cache(
             partial(triangle_section, scene.corners[scene.opaque])
         )
         self._pictures = Panoramas(scene, textures)
 
-    def best(self, places: NDArray[np.float64], height: float) -> BestView:
+    def best(self, places: Floats, height: float) -> BestView:
         """The best view from (n, 3) places at heights of about ``height``."""
         worth = self._pictures.worth(places)
         good = worth >= _AS_GOOD * worth.max()
@@ -206,18 +204,18 @@ class Outlook:
         return BestView(int(place), float(_YAW[way]), float(worth[place, way]))
 
 
-def lengths(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:
+def lengths(places: Floats, walls: Floats) -> Floats:
     """(n, DIRECTIONS) mean free distance of the sector about each direction, metres, from (n, 2)
     places among (m, 2, 2) walls."""
     step = max(1, _AT_ONCE // max(len(walls), 1))
     free = np.concatenate([_free(places[i : i + step], walls) for i in range(0, len(places), step)])
     sector = np.arange(-_SECTOR, _SECTOR + 1)
     around = (np.arange(DIRECTIONS)[:, None] + sector) % DIRECTIONS
-    mean: NDArray[np.float64] = free[:, around].mean(axis=2)
+    mean: Floats = free[:, around].mean(axis=2)
     return mean
 
 
-def _free(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:
+def _free(places: Floats, walls: Floats) -> Floats:
     """(n, 72) metres to the first wall in each direction; 0 where there is none."""
     along = walls[:, 1] - walls[:, 0]
     ends = walls - places[:, None, None]

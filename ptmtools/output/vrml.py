@@ -20,6 +20,7 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Singles
 from ptmtools.output.content import Content
 from ptmtools.output.convexity import convex_hull, hull_rows, slack_of
 from ptmtools.output.model import TextureRecord
@@ -119,7 +120,7 @@ class CellWriter:
         self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
         self._slack = slack_of(cells)
 
-    def cell(self, cell: int) -> tuple[str, NDArray[np.float32]]:
+    def cell(self, cell: int) -> tuple[str, Singles]:
         """The file of one cell, and the (2, 3) least and greatest corner of its hull and shapes."""
         g = self._geometry
         hull, triangles = self._hulls[cell]
@@ -216,7 +217,7 @@ def _surface(material: Material, colors: NDArray[np.uint8] | None) -> str:
     return f"    material Material {{ {fields} }}\n"
 
 
-def _color(material: Material, share: NDArray[np.float64] = _WHOLE) -> str:
+def _color(material: Material, share: Floats = _WHOLE) -> str:
     color = (s * min(max(c, 0.0), 1.0) for c, s in zip(material.color, share, strict=True))
     return " ".join(map(decimal, color))
 
@@ -226,7 +227,7 @@ def _urls(record: TextureRecord, fallback: bool) -> list[str]:
     return [sf_string("../" + quote(file)) for file in files if file is not None]
 
 
-def _points(points: NDArray[np.float32]) -> str:
+def _points(points: Singles) -> str:
     return field(row_texts(points))
 
 
@@ -250,7 +251,7 @@ def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
     yield ROOT, _root_text(content, boxes)
 
 
-def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
+def _root_text(content: Content, boxes: Sequence[Singles]) -> str:
     """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
     viewpoints, options = content.viewpoints, content.options
     info = [sf_string(f"ptm:database {PATTERN}")]
@@ -285,9 +286,7 @@ def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
     return "".join(parts)
 
 
-def _centre_boxes(
-    boxes: Sequence[NDArray[np.float32]],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _centre_boxes(boxes: Sequence[Singles]) -> tuple[Singles, Singles]:
     """Centres and sizes (n, 3) in float32 of boxes that contain the (n, 2, 3) boxes."""
     low, high = np.moveaxis(np.array(boxes, np.float64), 1, 0)
     centre = single((low + high) / 2, "bounding boxes")
