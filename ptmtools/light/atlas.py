@@ -149,7 +149,7 @@ def _longest(packed: _Layout) -> float:
 
 
 @kernel
-def cover(uv: NDArray[np.float64], size: int) -> NDArray[np.int32]:
+def cover(uv: Floats, size: int) -> NDArray[np.int32]:
     """(size, size) the first face that holds the centre of each texel, rows from the top; -1 for
     none. ``uv`` is (T, 3, 2), from the lower left."""
     owner = np.full((size, size), -1, np.int32)
@@ -176,7 +176,7 @@ def cover(uv: NDArray[np.float64], size: int) -> NDArray[np.int32]:
 
 
 @kernel
-def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32]:
+def claim(uv: Floats, owner: NDArray[np.int32]) -> NDArray[np.int32]:
     """(size, size) as `cover`; a texel whose centre no face holds belongs to the nearest face with
     a point less than a texel away along both axes, which reads it with bilinear filtering. So a
     face thinner than a texel has texels, too."""
@@ -221,17 +221,22 @@ def claim(uv: NDArray[np.float64], owner: NDArray[np.int32]) -> NDArray[np.int32
     return claimed
 
 
+def coordinates(uv: Floats, at: Floats) -> Floats:
+    """(n, 3) barycentric coordinates of (n, 2) places in the planes of (n, 3, 2) triangles; of
+    triangles without area some outside of them."""
+    a, b, c = np.moveaxis(uv, 1, 0)
+    area = _cross(b - a, c - a)
+    second, third = (
+        np.divide(part, area, out=np.full(len(at), -1.0), where=area != 0)
+        for part in (_cross(at - a, c - a), _cross(b - a, at - a))
+    )
+    return np.stack([1 - second - third, second, third], axis=1)
+
+
 def nearest(uv: Floats, at: Floats) -> Floats:
     """(n, 3) barycentric coordinates of the points of (n, 3, 2) triangles nearest to (n, 2)
     places."""
-    a, b, c = np.moveaxis(uv, 1, 0)
-    area = _cross(b - a, c - a)
-    flat = area == 0
-    second, third = (
-        np.divide(part, area, out=np.full(len(at), -1.0), where=~flat)
-        for part in (_cross(at - a, c - a), _cross(b - a, at - a))
-    )
-    result = np.stack([1 - second - third, second, third], axis=1)
+    result = coordinates(uv, at)
     outside = np.flatnonzero((result < 0).any(axis=1))
     best = np.full(len(outside), np.inf)
     for k in range(3):

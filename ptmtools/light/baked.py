@@ -155,14 +155,14 @@ def _starts(count: Ints) -> Ints:
 
 @kernel
 def find_pieces(
-    face: NDArray[np.int64],
-    point: NDArray[np.float64],
+    face: Ints,
+    point: Floats,
     front: Bools,
-    start: NDArray[np.int64],
-    piece: NDArray[np.int64],
-    corner: NDArray[np.float32],
+    start: Ints,
+    piece: Ints,
+    corner: Singles,
     side: NDArray[np.int8],
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[Ints, Floats]:
     """(n,) the piece of each face that holds a point, or is nearest to it, -1 if none of them shows
     the side; (n, 3) the shares of its corners in the point."""
     holder = np.full(len(face), -1)

@@ -139,6 +139,15 @@ class GatheredLight:
     samples: int
     near: float
 
+    def goes_on(self, face: Ints, point: Floats, beyond: Floats) -> Bools:
+        """(n,) whether the surface goes on, with nothing on it, from points of faces to (n, 3)
+        others in their planes."""
+        around = self.building.field.around
+        lift = around.lift * self.normal[face]
+        return around.free(point + lift, beyond + lift) & ~around.free(
+            beyond + lift, beyond - 2 * lift
+        )
+
     def indirect(
         self, face: Ints, point: Floats, turn: Floats, times: int = 1
     ) -> tuple[Singles, Singles, Bools]:

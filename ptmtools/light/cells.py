@@ -102,7 +102,7 @@ class CellLight:
 
     mapped: Bools
     lit: Bools
-    uv: NDArray[np.float32]
+    uv: Singles
     vertex: NDArray[np.uint8]
     white: float
     texels: Singles | None
@@ -209,14 +209,15 @@ class LightBaking:
         self, piece: CellSurfaces, corner: Floats, side: Floats, rows: Ints, grid: TexelGrid
     ) -> Singles:
         """(n, 3) the light of the texels; NaN where something covers them."""
-        point, turn = grid.points(), grid.turns()
+        turn = grid.turns()
         if self.building is None:
             look = self._look(piece, corner, side, rows, 1.0)
-            return np.repeat(look(grid.face, point, turn), 3, axis=1)
+            return np.repeat(look(grid.face, grid.points(), turn), 3, axis=1)
         near = 0.5 * grid.texel
         # Of one ray no variance is known.
         first = max(2, math.ceil(self.options.light_samples * _FIRST))
         lit = self.building.look(corner[rows], side[rows], first, near)
+        point = grid.spread(lit.goes_on)
         light, variance, covered = lit.indirect(grid.face, point, turn)
         # What few rays meet, as a window far away, is missed by most of the texels around.
         rays = np.ones(len(light), np.float32)

@@ -258,18 +258,18 @@ def _light_with_shadows(
 
 @kernel
 def _choose_lamps(
-    point: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    turn: NDArray[np.float64],
+    point: Floats,
+    normal: Floats,
+    turn: Floats,
     rays: int,
     kind: NDArray[np.uint8],
-    place: NDArray[np.float64],
-    way: NDArray[np.float64],
-    power: NDArray[np.float64],
-    area: NDArray[np.float64],
-    cone: NDArray[np.float64],
-    color: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    place: Floats,
+    way: Floats,
+    power: Floats,
+    area: Floats,
+    cone: Floats,
+    color: Floats,
+) -> tuple[Floats, Ints, Ints]:
     """(n, 3) the light of all lamps without shadows; (n, rays) the lamps that rays go to, and how
     many of the ``rays`` each of these stands for, 0 beyond the last."""
     total = np.zeros((len(point), 3))
@@ -304,16 +304,16 @@ def _choose_lamps(
 
 @inlined_kernel
 def _lamp_light(
-    point: NDArray[np.float64],
-    normal: NDArray[np.float64],
+    point: Floats,
+    normal: Floats,
     p: int,
     k: int,
     kind: NDArray[np.uint8],
-    place: NDArray[np.float64],
-    way: NDArray[np.float64],
-    power: NDArray[np.float64],
-    area: NDArray[np.float64],
-    cone: NDArray[np.float64],
+    place: Floats,
+    way: Floats,
+    power: Floats,
+    area: Floats,
+    cone: Floats,
 ) -> float:
     """The light of lamp ``k`` at point ``p``, with nothing between."""
     nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]

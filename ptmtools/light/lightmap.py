@@ -1,12 +1,13 @@
 """The lightmap of a mesh, and light at vertices.
 
-A texel has the light of the nearest point of its face, also where a look-up on a face reads it but
-no face holds its centre, as of sills thinner than a texel. What no face reads, and what is covered,
-takes the nearest value.
+A texel has the light of its centre, also where a look-up on a face reads it but no face holds its
+centre, if the surface goes on there in another cell; else, as on sills thinner than a texel, that
+of the nearest point of its face. What no face reads, and what is covered, takes the nearest value.
 
-Light by rays has grain. Each of four rounds takes the mean of 25 texels of the same chart, at twice
-the distance of the round before, of which those count less that differ by more than the grain, as
-its variance tells (Dammertz et al. 2010, Edge-Avoiding À-Trous Wavelet Transform; Schied et al.
+Light by rays has grain. Each of four rounds takes the plane through 25 texels of the same chart, at
+twice the distance of the round before, of which those count less that differ by more than the
+grain, as its variance tells (means would be wrong at the edges of charts, where light has a slope,
+and show as seams; Dammertz et al. 2010, Edge-Avoiding À-Trous Wavelet Transform; Schied et al.
 2017, Spatiotemporal Variance-Guided Filtering).
 
 A lightmap belongs to the charts of one mesh. Coarse meshes carry their light at vertices: values
@@ -17,6 +18,7 @@ whose linear interpolation is nearest to the light at many points of the faces, 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
 from ptmtools.jit import kernel
-from ptmtools.light.atlas import Atlas, claim, cover, nearest
+from ptmtools.light.atlas import Atlas, claim, coordinates, cover, nearest
 from ptmtools.light.looks import SMALLEST, Look
 from ptmtools.light.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
@@ -33,8 +35,13 @@ from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 _STEPS, _APART = (1, 2, 4, 8), 3.0
 #: Texels by which what is open grows into what is covered: beyond, the light of other rooms counts.
 _GROWN = 2
-#: Weights of texels at a distance of 0, 1 and 2 steps.
-_SPLINE = np.array([3 / 8, 1 / 4, 1 / 16], np.float32)
+#: Texels from a face to the centre of a texel that it reads, at most.
+_BEYOND = 2.0
+#: Variance of places along an axis, texels², below which values around a texel lie in no plane.
+_STIFF = 0.05
+#: (25, 3) 1 and the steps to the texels of a round, and (25,) their weights.
+_TAPS = np.array([(1, i, j) for i in range(-2, 3) for j in range(-2, 3)])
+_SPLINE = np.array([3 / 8, 1 / 4, 1 / 16])[abs(_TAPS[:, 1:])].prod(axis=1)
 
 
 @dataclass(frozen=True)
@@ -75,12 +82,31 @@ class TexelGrid:
 
     def points(self, number: Ints | slice = slice(None)) -> Floats:
         """(n, 3) the points of faces that are nearest to the centres of texels."""
-        size, face = len(self.chart), self.face[number]
-        across, up = (self.column[number] + 0.5) / size, 1 - (self.row[number] + 0.5) / size
-        share = nearest(self.uv[face], np.stack([across, up], axis=1))
+        share = nearest(self.uv[self.face[number]], self._centres(number))
         # Texels whose centres are on the lower edge of a wall would be in the ground.
         share += INWARD_SHARE * (1 / 3 - share)
-        return np.asarray(np.einsum("nk,nkx->nx", share, self.corner[face]))
+        return np.asarray(np.einsum("nk,nkx->nx", share, self.corner[self.face[number]]))
+
+    def spread(self, goes_on: Callable[[Ints, Floats, Floats], Bools]) -> Floats:
+        """(n, 3) `points`, or the centres of texels themselves, in the planes of faces, where the
+        surface ``goes_on`` from the points of these to them: parts of a wall in two cells agree."""
+        points = self.points()
+        out = np.flatnonzero(~self.centred[self.row, self.column])
+        face = self.face[out]
+        share = coordinates(self.uv[face], self._centres(out))
+        beyond = np.einsum("nk,nkx->nx", share, self.corner[face])
+        # Coordinates in slivers are inexact.
+        near = np.linalg.norm(beyond - points[out], axis=1) < _BEYOND * self.texel
+        out, face, beyond = out[near], face[near], beyond[near]
+        sound = goes_on(face, points[out], beyond)
+        points[out[sound]] = beyond[sound]
+        return points
+
+    def _centres(self, number: Ints | slice) -> Floats:
+        """(n, 2) coordinates of the centres of texels."""
+        size = len(self.chart)
+        across, up = (self.column[number] + 0.5) / size, 1 - (self.row[number] + 0.5) / size
+        return np.stack([across, up], axis=1)
 
     def turns(self, number: Ints | slice = slice(None)) -> Floats:
         """(n,) turns from 0 to 1, far apart in neighbours."""
@@ -97,7 +123,9 @@ class TexelGrid:
         value[self.row, self.column] = np.where(covered[:, None], 0, light)
         grain[self.row, self.column] = np.where(covered, 0, variance)
         for step in _STEPS:
-            value, grain = smooth(value, blur(grain, chart), chart, step, least, _SPLINE)
+            value, grain = smooth(
+                value, blur(grain, chart), chart, step, least, _STIFF, _TAPS, _SPLINE
+            )
         return np.where(covered[:, None], np.nan, value[self.row, self.column])
 
     def is_in_chart_of(self, chosen: Bools) -> Bools:
@@ -126,7 +154,7 @@ class TexelGrid:
 
 
 @kernel
-def blur(variance: NDArray[np.float32], chart: NDArray[np.int32]) -> NDArray[np.float32]:
+def blur(variance: Singles, chart: NDArray[np.int32]) -> Singles:
     """(h, w) the mean of the variances of the 7 × 7 texels around each in its chart: of rows, then
     of these along columns."""
     height, width = variance.shape
@@ -155,21 +183,23 @@ def blur(variance: NDArray[np.float32], chart: NDArray[np.int32]) -> NDArray[np.
 
 @kernel
 def smooth(
-    value: NDArray[np.float32],
-    variance: NDArray[np.float32],
+    value: Singles,
+    variance: Singles,
     chart: NDArray[np.int32],
     step: int,
     least: float,
-    spline: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """One round: (h, w, 3) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
-    and `_SPLINE`."""
-    height, width, _ = value.shape
+    stiff: float,
+    taps: Ints,
+    spline: Floats,
+) -> tuple[Singles, Singles]:
+    """One round: (h, w, k) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
+    and `_TAPS`."""
+    height, width, channels = value.shape
     result, rest, mean = np.zeros_like(value), np.zeros_like(variance), np.zeros_like(variance)
     for row in range(height):
         for column in range(width):
-            red, green, blue = value[row, column, 0], value[row, column, 1], value[row, column, 2]
-            mean[row, column] = (red + green + blue) / 3
+            mean[row, column] = value[row, column].mean()
+    share, moment = np.empty(len(taps)), np.empty((3, 3))
     for row in range(height):
         for column in range(width):
             number = chart[row, column]
@@ -177,33 +207,37 @@ def smooth(
                 continue
             centre = mean[row, column]
             sharp = 1 / (_APART * np.sqrt(variance[row, column]) + least)
-            weight, total, red, green, blue = 0.0, 0.0, 0.0, 0.0, 0.0
-            for i in range(-2, 3):
-                r = row + step * i
-                if not 0 <= r < height:
-                    continue
-                for j in range(-2, 3):
-                    c = column + step * j
-                    if not 0 <= c < width or chart[r, c] != number:
-                        continue
-                    apart = np.exp(-abs(centre - mean[r, c]) * sharp)
-                    share = spline[abs(i)] * spline[abs(j)] * apart
-                    weight += share
-                    total += share * share * variance[r, c]
-                    red += share * value[r, c, 0]
-                    green += share * value[r, c, 1]
-                    blue += share * value[r, c, 2]
-            result[row, column, 0] = red / weight
-            result[row, column, 1] = green / weight
-            result[row, column, 2] = blue / weight
-            rest[row, column] = total / (weight * weight)
+            moment[:] = 0
+            for k in range(len(taps)):
+                r, c = row + step * taps[k, 1], column + step * taps[k, 2]
+                share[k] = 0
+                if 0 <= r < height and 0 <= c < width and chart[r, c] == number:
+                    share[k] = spline[k] * np.exp(-abs(centre - mean[r, c]) * sharp)
+                    for a in range(3):
+                        for b in range(3):
+                            moment[a, b] += share[k] * taps[k, a] * taps[k, b]
+            # The first row of the inverse: weights of values for that of their plane here.
+            rows = moment[1, 1] + stiff * moment[0, 0]
+            columns = moment[2, 2] + stiff * moment[0, 0]
+            first = rows * columns - moment[1, 2] ** 2
+            second = moment[1, 2] * moment[0, 2] - moment[0, 1] * columns
+            third = moment[0, 1] * moment[1, 2] - rows * moment[0, 2]
+            whole = moment[0, 0] * first + moment[0, 1] * second + moment[0, 2] * third
+            for k in range(len(taps)):
+                if share[k] > 0:
+                    r, c = row + step * taps[k, 1], column + step * taps[k, 2]
+                    part = share[k] / whole
+                    part *= first + second * taps[k, 1] + third * taps[k, 2]
+                    rest[row, column] += part * part * variance[r, c]
+                    for a in range(channels):
+                        result[row, column, a] += part * value[r, c, a]
+            for a in range(channels):
+                result[row, column, a] = max(result[row, column, a], 0.0)
     return result, rest
 
 
 @kernel
-def grow(
-    value: NDArray[np.float32], known: Bools, chart: NDArray[np.int32]
-) -> tuple[NDArray[np.float32], Bools]:
+def grow(value: Singles, known: Bools, chart: NDArray[np.int32]) -> tuple[Singles, Bools]:
     """The (h, w, k) values and the (h, w) known ones, with those next to known ones in their
     chart, which have the mean of these."""
     height, width, channels = value.shape
@@ -291,9 +325,7 @@ def _vertex_numbers(corner: Floats, normal: Floats) -> Ints:
 
 
 @kernel
-def number_by_way(
-    order: NDArray[np.int64], place: NDArray[np.int64], way: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def number_by_way(order: Ints, place: Ints, way: Floats) -> Ints:
     """(n,) numbers, equal for rows in one place whose (n, 3) ways are nearly those of the first of
     them. ``order``: (n,) the rows by their ``place``."""
     number, given = np.empty(len(order), np.int64), 0

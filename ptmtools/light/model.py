@@ -28,7 +28,7 @@ class CellSurfaces:
     face: (n,) the triangle of the scene that it is a piece of.
     """
 
-    corner: NDArray[np.float32]
+    corner: Singles
     object: Ints
     shape: Ints
     glass: Bools
@@ -99,7 +99,7 @@ class Light:
     exposure: Floats
     lit: Bools
     mapped: Bools
-    uv: NDArray[np.float32]
+    uv: Singles
     vertex: NDArray[np.uint8]
     horizon: Floats
     shine: Floats

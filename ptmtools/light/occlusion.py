@@ -224,12 +224,7 @@ def turns(count: int) -> Floats:
 
 
 @kernel
-def rays_over(
-    start: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    turn: NDArray[np.float64],
-    fan: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def rays_over(start: Floats, normal: Floats, turn: Floats, fan: Singles) -> tuple[Singles, Singles]:
     """(n * m, 3) origins and directions of rays: from each of (n, 3) points those of a (m, 3)
     ``fan`` over z, with z along (n, 3) unit normals, turned about them by (n,) turns."""
     origin = np.empty((len(start) * len(fan), 3), np.float32)

@@ -85,13 +85,13 @@ def patch_number(split: int, u: float, v: float) -> int:
 
 @kernel
 def points_of(
-    corner: NDArray[np.float64],
+    corner: Floats,
     split: NDArray[np.int32],
-    face: NDArray[np.int64],
-    number: NDArray[np.int64],
-    across: NDArray[np.float64],
-    along: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    face: Ints,
+    number: Ints,
+    across: Floats,
+    along: Floats,
+) -> Floats:
     """See `LightPatches.points`."""
     result = np.empty((len(face), 3))
     for k in range(len(face)):

@@ -236,9 +236,7 @@ def _lobes(target: int, side: int, alpha: float) -> Singles:
 
 
 @kernel
-def share_lobes(
-    target: NDArray[np.float64], way: NDArray[np.float64], solid: NDArray[np.float64], alpha: float
-) -> NDArray[np.float32]:
+def share_lobes(target: Floats, way: Floats, solid: Floats, alpha: float) -> Singles:
     """(m, n) the shares of (n, 3) directions of (n,) steradians; see `_lobes`."""
     result = np.zeros((len(target), len(way)), np.float32)
     for t in range(len(target)):
@@ -256,7 +254,7 @@ def share_lobes(
 
 
 @kernel
-def weigh(share: NDArray[np.float32], light: NDArray[np.float32]) -> NDArray[np.float32]:
+def weigh(share: Singles, light: Singles) -> Singles:
     """(m, k) the product of (m, n) shares and (n, k) light, the same for any number of threads."""
     result = np.zeros((len(share), light.shape[1]), np.float32)
     for t in range(len(share)):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Singles
+from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.jit import kernel
 from ptmtools.light.occlusion import (
     RAYS,
@@ -195,20 +195,20 @@ def extrapolation(sums: Sequence[float]) -> float:
 @kernel
 def receive(
     face: NDArray[np.int32],
-    u: NDArray[np.float32],
-    v: NDArray[np.float32],
-    length: NDArray[np.float32],
-    across: NDArray[np.float32],
-    along: NDArray[np.float32],
+    u: Singles,
+    v: Singles,
+    length: Singles,
+    across: Singles,
+    along: Singles,
     split: NDArray[np.int32],
-    first: NDArray[np.int64],
-    radiance: NDArray[np.float32],
-    sky: NDArray[np.float64],
-    ground: NDArray[np.float64],
-    passed: NDArray[np.float32],
+    first: Ints,
+    radiance: Singles,
+    sky: Floats,
+    ground: Floats,
+    passed: Singles,
     samples: int,
     near: float,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[Singles, Singles, Singles]:
     """The fields of `Arrived`, the last two (n, 1), for ``samples`` rays of each point, which go
     ``along`` and meet faces with normals ``across``, of any length; a share of each colour, if
     ``passed`` is not empty, passes."""

@@ -43,6 +43,18 @@ def test_grain_is_smoothed_and_edges_of_light_stay() -> None:
     assert smooth[~left].mean() == pytest.approx(wanted[~left].mean(), rel=0.03)
 
 
+def test_light_with_a_slope_stays_at_the_edges_of_charts() -> None:
+    """Means would be those of the inner side, and walls in two cells would have a seam."""
+    grid = grid_of(GROUND)
+    random, wanted = np.random.default_rng(2), 90 + grid.points()[:, [0]]
+    grain = 0.3 * np.ones(len(wanted), np.float32)
+    light = (wanted + np.sqrt(grain)[:, None] * random.standard_normal(wanted.shape)).astype("f4")
+    smooth = grid.smooth(light, grain, 1e-3)
+    place = grid.points()[:, 0]
+    for edge in (place < np.quantile(place, 0.02), place > np.quantile(place, 0.98)):
+        assert smooth[edge].mean() == pytest.approx(wanted[edge].mean(), abs=0.08)
+
+
 def test_covered_texels_take_what_is_open_and_give_nothing() -> None:
     grid = grid_of(GROUND)
     light = np.ones((len(grid.face), 1), np.float32)

@@ -134,7 +134,7 @@ class EmitStage(Stage[None]):
 
     name = "emit"
     about = "Write the served files: cells and hints."
-    recipe = 17
+    recipe = 18
     changed = (
         "the exposure of a cell balances its white; "
         "GLBs have normals of what is curved and reflects; "

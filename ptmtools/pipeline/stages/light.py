@@ -345,8 +345,8 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 15
-    changed = "small models have smaller lightmaps"
+    recipe = 16
+    changed = "the light of walls in two cells has smaller seams"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
