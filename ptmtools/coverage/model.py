@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.store.archive import Stored, texts
 
 
@@ -48,26 +49,26 @@ class Ach:
     renderer: the renderer's own name, for the record.
     """
 
-    start: NDArray[np.int64]
-    value: NDArray[np.float64]
-    pixels: NDArray[np.float64]
-    error: NDArray[np.float64]
-    p95: NDArray[np.float64]
-    seen: NDArray[np.float64]
-    views: NDArray[np.float64]
-    missed: NDArray[np.float64]
+    start: Ints
+    value: Floats
+    pixels: Floats
+    error: Floats
+    p95: Floats
+    seen: Floats
+    views: Floats
+    missed: Floats
     samples: NDArray[np.int32]
     rejected: NDArray[np.int32]
-    uncertain: NDArray[np.float64]
-    unseen_below: NDArray[np.float64]
-    floor: NDArray[np.float64]
-    texture_start: NDArray[np.int64]
+    uncertain: Floats
+    unseen_below: Floats
+    floor: Floats
+    texture_start: Ints
     texture: NDArray[np.int32]
-    texture_value: NDArray[np.float64]
+    texture_value: Floats
     backend: str
     renderer: str
 
-    def row(self, i: int) -> NDArray[np.float64]:
+    def row(self, i: int) -> Floats:
         """The hints of cell ``i``, aligned with row ``i`` of the PVS."""
         return self.value[self.entries(i)]
 

@@ -275,9 +275,7 @@ def _texels(scene: Scene, sizes: Floats) -> Floats:
     return np.asarray(np.where(flat, np.inf, counted))
 
 
-def _distances(
-    cells: Cells, pvs: Pvs, piece: NDArray[np.int64], owner: NDArray[np.int32]
-) -> Floats:
+def _distances(cells: Cells, pvs: Pvs, piece: Ints, owner: NDArray[np.int32]) -> Floats:
     """(n,) lower bounds of the distance, metres, from pieces to the nearest eye that may see them;
     inf without such an eye. ``owner`` (n,) ascends."""
     corners = cells.vertex[cells.triangle[piece]]

@@ -123,7 +123,7 @@ def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
     return np.asarray(np.rint(colors @ np.array([0.299, 0.587, 0.114])).astype(np.uint8))
 
 
-def _resize(opacity: NDArray[np.uint8], width: int, height: int) -> NDArray[np.float64]:
+def _resize(opacity: NDArray[np.uint8], width: int, height: int) -> Floats:
     from PIL import Image
 
     if opacity.shape != (height, width):

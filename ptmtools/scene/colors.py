@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, Ints
 
 
 def to_srgb(light: Floats) -> Floats:
@@ -41,13 +41,13 @@ def luminance(light: Floats) -> Floats:
     return np.asarray(light @ np.array([0.2126, 0.7152, 0.0722]))
 
 
-def pack_colors(colors: NDArray[np.uint8]) -> NDArray[np.int64]:
+def pack_colors(colors: NDArray[np.uint8]) -> Ints:
     """(...,) one number for each of (..., 3) colours."""
     red, green, blue = np.moveaxis(colors.astype(np.int64), -1, 0)
     return np.asarray(red << 16 | green << 8 | blue)
 
 
-def unpack_colors(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
+def unpack_colors(numbers: Ints) -> NDArray[np.uint8]:
     """The inverse of `pack_colors`."""
     return np.stack([numbers >> 16, numbers >> 8, numbers], axis=-1).astype(np.uint8)
 

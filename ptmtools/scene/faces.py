@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import normals, units
+from ptmtools.arrays import Bools, Floats, Ints, normals, units
 from ptmtools.tolerance import PLANE_SHARE, ROUNDING_SHARE, TIE_SHARE
 
 #: A face is a stray beyond this many sizes of the faces around the middle of the model,
@@ -47,17 +47,17 @@ class KeptFaces:
     strays: (n,) int64 numbers of the faces dropped as strays, increasing.
     """
 
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    source: NDArray[np.int64]
-    paired: NDArray[np.bool_]
-    keeper: NDArray[np.int64]
+    points: Floats
+    triangles: Ints
+    source: Ints
+    paired: Bools
+    keeper: Ints
     not_finite: int
     degenerate: int
-    strays: NDArray[np.int64]
+    strays: Ints
 
 
-def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> KeptFaces:
+def keep_faces(points: Floats, triangles: Ints) -> KeptFaces:
     """Cleans (T, 3) triangles over (P, 3) points; every index is in range."""
     finite_point = np.asarray(np.isfinite(points).all(axis=1))
     finite = finite_point[triangles].all(axis=1)
@@ -105,9 +105,7 @@ def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Kep
     )
 
 
-def opposite_polygons(
-    points: NDArray[np.float64], triangles: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def opposite_polygons(points: Floats, triangles: Ints) -> Bools:
     """(T,) which of (T, 3) triangles over (P, 3) finite points are in a flat polygon with an
     opposite."""
     if len(triangles) < 2:
@@ -147,7 +145,7 @@ def opposite_polygons(
     return np.asarray(((sums[0][match] == sums[1]) & same)[polygon])
 
 
-def _groups(count: int, first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.int64]:
+def _groups(count: int, first: Ints, second: Ints) -> Ints:
     """(count,) a number from 0 for each of the items that pairs join."""
     label = np.arange(count)
     while (label[first] != label[second]).any():
@@ -160,7 +158,7 @@ def _groups(count: int, first: NDArray[np.int64], second: NDArray[np.int64]) -> 
     return np.asarray(np.unique(label, return_inverse=True)[1])
 
 
-def _marks(start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.uint64]:
+def _marks(start: Ints, end: Ints) -> NDArray[np.uint64]:
     """A number of 64 bits for each directed edge, as if drawn at random (Steele et al. 2014)."""
     mark = start.astype(np.uint64) << np.uint64(32) | end.astype(np.uint64)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
@@ -168,7 +166,7 @@ def _marks(start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.uint6
     return mark ^ mark >> np.uint64(31)
 
 
-def stray_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+def stray_faces(points: Floats, triangles: Ints) -> Bools:
     """(T,) which of (T, 3) triangles over (P, 3) points, finite where used, are strays: those
     beyond the first gap of `_REACH` sizes that leaves most triangles on its inner side."""
     none = np.zeros(len(triangles), dtype=bool)
@@ -188,9 +186,7 @@ def stray_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> ND
     return radius > ordered[gap[0]] if len(gap) else none
 
 
-def _weld(
-    points: NDArray[np.float64], triangles: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _weld(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """The distinct used points, and the triangles over them."""
     used, index = _compact(points, triangles)
     if not len(used):
@@ -203,9 +199,7 @@ def _weld(
     return used[order][distinct], number[index]
 
 
-def _compact(
-    points: NDArray[np.float64], triangles: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _compact(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """The used points in the order of first use, and the triangles over them."""
     flat = triangles.reshape(-1)
     first = np.full(len(points), len(flat), dtype=np.int64)
@@ -217,7 +211,7 @@ def _compact(
     return points[used], number[triangles]
 
 
-def _degenerate(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _degenerate(points: Floats, triangles: Ints) -> Bools:
     """(T,) whether a triangle's height is below the rounding of its coordinates."""
     if not len(triangles):
         return np.zeros(0, dtype=bool)
@@ -233,5 +227,5 @@ def _degenerate(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> ND
     edge = np.roll(local, -1, axis=1) - local
     longest = np.linalg.norm(edge, axis=2).max(axis=1)
     twice_area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
-    thin: NDArray[np.bool_] = twice_area <= rounding * longest
+    thin: Bools = twice_area <= rounding * longest
     return thin

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools
 from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
@@ -96,7 +97,7 @@ class ImageRecord:
     derived: bool = False
 
     @property
-    def holes(self) -> NDArray[np.bool_] | None:
+    def holes(self) -> Bools | None:
         """(H, W) bool, rows from the top, the texels that are not opaque; None if all are."""
         if self.bits is None:
             return None
@@ -159,7 +160,7 @@ class ImageStore:
         self.mark_as_input(texture)
         return replace(texture, read=ConvertedBytes(texture.read, self.limit))
 
-    def add(self, texture: SourceTexture) -> tuple[int, NDArray[np.bool_] | None] | None:
+    def add(self, texture: SourceTexture) -> tuple[int, Bools | None] | None:
         """The number of a texture's image, and its `ImageRecord.holes`; None, and a miss, if it
         cannot be decoded."""
         record = self.record(texture)
@@ -402,7 +403,7 @@ def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
     elif channel is None:
         return None
 
-    def transparent(strip: Image.Image) -> NDArray[np.bool_]:
+    def transparent(strip: Image.Image) -> Bools:
         return np.asarray(strip.convert(mode).getchannel(band)) < 255
 
     width, height = opened.size

@@ -310,7 +310,7 @@ def _scene(draft: Draft) -> Scene:
     )
 
 
-def _two_sided(kept: KeptFaces, source: ModelSource) -> NDArray[np.bool_]:
+def _two_sided(kept: KeptFaces, source: ModelSource) -> Bools:
     """(T,) whether a kept face or a duplicate of it is two-sided and no other face is behind it."""
     two_sided = np.array([m.two_sided for m in source.materials], dtype=bool)
     position = np.full(len(kept.keeper), -1, dtype=np.int64)

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Ints
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.lazy import pymeshlab_absence
 from ptmtools.progress import Progress, silent
@@ -164,7 +165,7 @@ def _no_faces(path: Path) -> InputError:
     return InputError("PTM-I247", "no faces", file=path, remedy="use a model with faces")
 
 
-def _colors(mesh: Any, faces: NDArray[np.int64], notes: IngestNotes) -> NDArray[np.uint8] | None:
+def _colors(mesh: Any, faces: Ints, notes: IngestNotes) -> NDArray[np.uint8] | None:
     """(T, 3, 3) sRGB of corners, if vertices or faces have colours."""
     kind = getattr(mesh.visual, "kind", None)
     if kind not in ("vertex", "face"):

@@ -14,6 +14,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Singles
 from ptmtools.store.archive import Stored
 
 LampKind = Literal["point", "spot", "sun"]
@@ -81,12 +82,12 @@ class Lights:
     maps: the lightmaps of the model.
     """
 
-    glow: NDArray[np.float32]
-    unlit: NDArray[np.bool_]
-    transmits: NDArray[np.float32]
+    glow: Singles
+    unlit: Bools
+    transmits: Singles
     lamps: tuple[Lamp, ...]
     map: NDArray[np.int32]
-    uv: NDArray[np.float32]
+    uv: Singles
     maps: tuple[ModelMap, ...]
 
     @staticmethod

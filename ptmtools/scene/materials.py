@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.progress import Progress
 from ptmtools.scene.baking import LARGEST, bake, emitted_wraps, near_origin
 from ptmtools.scene.faces import KeptFaces
@@ -92,10 +92,10 @@ def gather_materials(
     return SceneMaterials(used, tuple(materials), triangle_material, uv, colors, normal_uv)
 
 
-def _coordinates(source: ModelSource, kept: KeptFaces, notes: IngestNotes) -> NDArray[np.float64]:
+def _coordinates(source: ModelSource, kept: KeptFaces, notes: IngestNotes) -> Floats:
     """(T, 3, 2) of kept faces, all finite, and near the origin for repeating textures."""
     uv = source.uv[kept.source]
-    unusable: NDArray[np.bool_] = np.logical_not(np.isfinite(uv).all(axis=(1, 2)))
+    unusable: Bools = np.logical_not(np.isfinite(uv).all(axis=(1, 2)))
     uv[unusable] = 0.0
     textures = [material.texture for material in source.materials]
     repeats = np.array(
@@ -115,9 +115,9 @@ def _normal_coordinates(
     source: ModelSource,
     kept: KeptFaces,
     materials: Sequence[Material],
-    material: NDArray[np.int64],
-    uv: NDArray[np.float64],
-) -> NDArray[np.float64] | None:
+    material: Ints,
+    uv: Floats,
+) -> Floats | None:
     """(T, 3, 2) of kept faces, finite and near the origin, in the normal maps that have their own
     coordinates: those of the source, or else ``uv``; ``material`` (T,) of each face. None without.
     """
@@ -166,7 +166,7 @@ def _matter(material: SourceMaterial, images: OptionalImages) -> tuple[float, fl
 
 
 def _material(
-    material: SourceMaterial, uv: NDArray[np.float64], store: ImageStore, notes: IngestNotes
+    material: SourceMaterial, uv: Floats, store: ImageStore, notes: IngestNotes
 ) -> Material:
     """The emitted form of a material whose kept faces have these (n, 3, 2) coordinates."""
     texture, image = material.texture, -1

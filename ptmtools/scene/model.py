@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.arrays import Bools, Floats
 from ptmtools.scene.lights import Lights
 from ptmtools.scene.orientation.main_axes import tolerance_of
 from ptmtools.store.archive import Stored, without_repeats
@@ -180,7 +181,7 @@ class RoomVolume:
     """
 
     name: str
-    points: NDArray[np.float64]
+    points: Floats
     triangles: NDArray[np.int32]
 
     def __eq__(self, value: object) -> bool:
@@ -230,19 +231,19 @@ class Scene:
     lights: lamps, emission and lightmaps, stored beside the artifact.
     """
 
-    points: NDArray[np.float64]
+    points: Floats
     triangles: NDArray[np.int32]
-    uv: NDArray[np.float64]
+    uv: Floats
     triangle_object: NDArray[np.int32]
     triangle_material: NDArray[np.int32]
-    two_sided: NDArray[np.bool_]
+    two_sided: Bools
     objects: tuple[str, ...]
     materials: tuple[Material, ...]
     tolerance: Tolerance
     images: tuple[SourceImage, ...] = ()
     cameras: tuple[Camera, ...] = ()
     colors: NDArray[np.uint8] | None = None
-    normal_uv: NDArray[np.float64] | None = None
+    normal_uv: Floats | None = None
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
     rooms: tuple[RoomVolume, ...] = ()
@@ -253,17 +254,17 @@ class Scene:
     lights: Lights | None = field(default=None, compare=False)
 
     @property
-    def corners(self) -> NDArray[np.float64]:
+    def corners(self) -> Floats:
         """(T, 3, 3) corner positions, metres."""
         return self.points[self.triangles]
 
     @property
-    def opaque(self) -> NDArray[np.bool_]:
+    def opaque(self) -> Bools:
         """(T,) whether each triangle occludes."""
         opaque = np.array([not m.transparent for m in self.materials], dtype=bool)
         return opaque[self.triangle_material]
 
-    def with_points(self, points: NDArray[np.float64]) -> Scene:
+    def with_points(self, points: Floats) -> Scene:
         """The same triangles over other points (V, 3), with the tolerances of those."""
         return replace(
             self, points=points, tolerance=tolerance_of(points, self.triangles, self.tolerance.step)

@@ -11,8 +11,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Camera, Note
 from ptmtools.scene.reference import ModelFolder
@@ -116,8 +116,8 @@ class IngestNotes:
         self,
         name: str,
         place: str,
-        position: NDArray[np.float64],
-        direction: NDArray[np.float64],
+        position: Floats,
+        direction: Floats,
         field_of_view: float,
     ) -> list[Camera]:
         """The camera of a model, whose direction may have any length; none, and a note, unless it

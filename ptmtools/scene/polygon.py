@@ -21,9 +21,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ptmtools.arrays import cross
+from ptmtools.arrays import Bools, Floats, Ints, cross
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.tolerance import ROUNDING_SHARE
 
@@ -45,8 +44,8 @@ class Triangulation:
         budget.
     """
 
-    corner: NDArray[np.int64]
-    polygon: NDArray[np.int64]
+    corner: Ints
+    polygon: Ints
     tangled: int
 
     def note(self, notes: IngestNotes, place: str) -> None:
@@ -56,7 +55,7 @@ class Triangulation:
             notes.note("PTM-N211", message, place, self.tangled)
 
 
-def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Triangulation:
+def triangulate(corners: Floats, start: Ints) -> Triangulation:
     """Cuts each polygon into triangles of the same winding.
 
     Parameters
@@ -65,8 +64,8 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
     start: (P + 1,) polygon p has the corners ``start[p]`` to ``start[p + 1]``, at least three.
     """
     size = np.diff(start)
-    corner: list[NDArray[np.int64]] = []
-    polygon: list[NDArray[np.int64]] = []
+    corner: list[Ints] = []
+    polygon: list[Ints] = []
     tangled = 0
     steps = _BASE_STEPS + _CORNER_STEPS * len(corners)
     for n in np.unique(size).tolist():
@@ -97,9 +96,7 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
     return Triangulation(np.concatenate(corner)[order], owner[order], tangled)
 
 
-def cut(
-    corners: NDArray[np.float64], start: NDArray[np.int64], notes: IngestNotes, place: str
-) -> Triangulation:
+def cut(corners: Floats, start: Ints, notes: IngestNotes, place: str) -> Triangulation:
     """`triangulate` of the polygons of at least three corners; others are a miss."""
     size = np.diff(start)
     kept = np.flatnonzero(size >= 3)
@@ -112,7 +109,7 @@ def cut(
     return result
 
 
-def keyhole(loops: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.int64], int]:
+def keyhole(loops: Sequence[Floats]) -> tuple[Ints, int]:
     """The outline that walks around a polygon and its holes, along a bridge to each hole and back.
 
     ``loops`` are (n, 3) corners: the outline, then holes of either direction. Returns the corners
@@ -146,21 +143,16 @@ def keyhole(loops: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.int64], in
     return path, omitted
 
 
-def _turn(loop: NDArray[np.float64]) -> float:
+def _turn(loop: Floats) -> float:
     """Twice the area of a loop (n, 2), counter-clockwise positive."""
     x, y = (loop - loop[0]).T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
-def _crosses(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    d: NDArray[np.float64],
-) -> bool:
+def _crosses(a: Floats, b: Floats, c: Floats, d: Floats) -> bool:
     """Whether the line from a to b crosses one of the (n, 2) lines from c to d."""
 
-    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> Any:
+    def side(p: Floats, q: Floats, r: Floats) -> Any:
         pq, pr = q - p, r - p
         return pq[..., 0] * pr[..., 1] - pq[..., 1] * pr[..., 0]
 
@@ -168,7 +160,7 @@ def _crosses(
     return bool(apart.any())
 
 
-def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _fans(shape: Floats) -> tuple[Ints, Bools]:
     """Fans (m, n - 2, 3) of local indices, and (m,) whether they are valid."""
     m, n, _ = shape.shape
     fan = fan_of(n)
@@ -190,20 +182,20 @@ def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.boo
     return cut, right
 
 
-def fan_of(n: int) -> NDArray[np.int64]:
+def fan_of(n: int) -> Ints:
     """(n - 2, 3) local indices of the fan around the first of n corners."""
     second = np.arange(1, n - 1)
     return np.stack([np.zeros_like(second), second, second + 1], axis=1)
 
 
-def strip_of(n: int) -> NDArray[np.int64]:
+def strip_of(n: int) -> Ints:
     """(n - 2, 3) local indices of the strip over n corners."""
     strip = np.arange(max(n - 2, 0))[:, None] + np.arange(3)
     strip[1::2] = strip[1::2, ::-1]
     return strip
 
 
-def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64], bool, int]:
+def _clip_ears(shape: Floats, steps: int) -> tuple[Ints, bool, int]:
     """Triangles (k, 3) of one polygon, whether its outline is simple, and the number of steps,
     about ``steps`` at most."""
     n = len(shape)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.jit import kernel
 
 
 @kernel
-def clip_ears(
-    flat: NDArray[np.float64], rounding: float, limit: int
-) -> tuple[NDArray[np.int64], bool, int]:
+def clip_ears(flat: Floats, rounding: float, limit: int) -> tuple[Ints, bool, int]:
     """Triangles (k, 3) of an outline (n, 2), counter-clockwise, as indices of its corners; whether
     all are ears; and the number of steps. After ``limit`` steps, or without an ear, the rest
     becomes a fan. Corners whose triangle has less than the area ``rounding`` lie on an edge.

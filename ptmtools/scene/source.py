@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.files import open_regular
 from ptmtools.scene.faces import keep_faces
 from ptmtools.scene.lights import Lamp, Radiance
@@ -183,18 +183,18 @@ class ModelSource:
     lamps: finite, in the space of the file.
     """
 
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    uv: NDArray[np.float64]
-    triangle_object: NDArray[np.int64]
-    triangle_material: NDArray[np.int64]
+    points: Floats
+    triangles: Ints
+    uv: Floats
+    triangle_object: Ints
+    triangle_material: Ints
     objects: tuple[str, ...]
     materials: tuple[SourceMaterial, ...]
     cameras: tuple[Camera, ...] = ()
     metres: float | None = None
     up: Literal["y", "z"] | None = None
     colors: NDArray[np.uint8] | None = None
-    normal_uv: NDArray[np.float64] | None = None
+    normal_uv: Floats | None = None
     step: float = 0.0
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
@@ -333,7 +333,7 @@ class MeshArrays:
         )
 
 
-def _repeat(values: NDArray[Any], times: int, mirrored: NDArray[np.bool_]) -> NDArray[Any]:
+def _repeat(values: NDArray[Any], times: int, mirrored: Bools) -> NDArray[Any]:
     """(times · t, 3, m) values of corners, in reverse order for mirrored instances."""
     copies = np.broadcast_to(values, (times, *values.shape)).copy()
     copies[mirrored] = copies[mirrored][..., ::-1, :]

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.scene.model import Wrap
 
 #: A triangle over more repetitions of the image than this is assumed to use every texel.
@@ -23,9 +24,7 @@ _MANY_TILES = 16
 _SLACK = 1e-9
 
 
-def uses_holes(
-    holes: NDArray[np.bool_], uv: NDArray[np.float64], wrap_s: Wrap, wrap_t: Wrap
-) -> bool:
+def uses_holes(holes: Bools, uv: Floats, wrap_s: Wrap, wrap_t: Wrap) -> bool:
     """Whether some triangle uses a texel that is not opaque.
 
     Parameters
@@ -81,7 +80,7 @@ def uses_holes(
     )
 
 
-def _table(holes: NDArray[np.bool_]) -> NDArray[np.uint32]:
+def _table(holes: Bools) -> NDArray[np.uint32]:
     """(H + 1, W + 1) number of holes above and to the left of each texel corner."""
     table = np.zeros((holes.shape[0] + 1, holes.shape[1] + 1), dtype=np.uint32)
     inner = table[1:, 1:]
@@ -91,14 +90,12 @@ def _table(holes: NDArray[np.bool_]) -> NDArray[np.uint32]:
     return table
 
 
-def _count_holes(
-    table: NDArray[np.uint32], x: NDArray[np.int64], y: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _count_holes(table: NDArray[np.uint32], x: Ints, y: Ints) -> Ints:
     """Holes in [0, x) × [0, y) of the plane tiled with the image."""
     height, width = table.shape[0] - 1, table.shape[1] - 1
     tiles_x, rest_x = np.divmod(x, width)
     tiles_y, rest_y = np.divmod(y, height)
-    count: NDArray[np.int64] = (
+    count: Ints = (
         tiles_x * tiles_y * int(table[-1, -1])
         + tiles_x * table[rest_y, -1].astype(np.int64)
         + tiles_y * table[-1, rest_x].astype(np.int64)
@@ -107,9 +104,7 @@ def _count_holes(
     return count
 
 
-def _touches(
-    table: NDArray[np.uint32], triangle: NDArray[np.float64], box: NDArray[np.int64]
-) -> bool:
+def _touches(table: NDArray[np.uint32], triangle: Floats, box: Ints) -> bool:
     """Whether a (3, 2) triangle in texels overlaps the square of a hole within its box."""
     height, width = table.shape[0] - 1, table.shape[1] - 1
     x0, y0, x1, y1 = box.tolist()
@@ -143,12 +138,12 @@ def _touches(
     reached &= end > first
     row = rows[reached] % height
 
-    def holes_before(column: NDArray[np.int64]) -> NDArray[np.int64]:
+    def holes_before(column: Ints) -> Ints:
         """Holes of each row to the left of a column of the tiled plane."""
         tiles, rest = np.divmod(column, width)
         whole = table[row + 1, -1].astype(np.int64) - table[row, -1]
         part = table[row + 1, rest].astype(np.int64) - table[row, rest]
-        count: NDArray[np.int64] = tiles * whole + part
+        count: Ints = tiles * whole + part
         return count
 
     return bool((holes_before(end[reached]) > holes_before(first[reached])).any())

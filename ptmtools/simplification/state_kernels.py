@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.jit import plain_kernel as kernel
 
 #: Maximum number of faces of an edge that may collapse.
@@ -63,7 +63,7 @@ class CollapseState(NamedTuple):
     next_corner: NDArray[np.int32]
     version: NDArray[np.int32]
     mark: Ints
-    moved: NDArray[np.bool_]
+    moved: Bools
     counters: Ints
     optimum: Floats
     shared: NDArray[np.int32]

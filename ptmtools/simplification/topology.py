@@ -291,9 +291,7 @@ def is_outer_boundary(triangle: Ints, point: Floats, loop: Ints) -> bool:
 
 
 @kernel
-def clip_ears(
-    triangle: Ints, point: Floats, loop: Ints, key: Ints, corner: NDArray[np.int64]
-) -> bool:
+def clip_ears(triangle: Ints, point: Floats, loop: Ints, key: Ints, corner: Ints) -> bool:
     """Triangulates a loop by ear clipping, the shortest new edge first; False if every ear would
     duplicate an edge."""
     count, clipped = len(loop), 0

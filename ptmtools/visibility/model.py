@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.store.archive import Stored
 
 #: Counts for each portal.
@@ -39,16 +40,16 @@ class Pvs:
         0 if they were done.
     """
 
-    start: NDArray[np.int64]
+    start: Ints
     cell: NDArray[np.int32]
-    work: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
-    ties: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    decided: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    opened: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    work: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    cut: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
+    ties: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    decided: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    opened: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     leak: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    volume: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    standing: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    volume: Floats = field(default_factory=lambda: np.zeros(0))
+    standing: Floats = field(default_factory=lambda: np.zeros(0))
     conservative: bool = True
     spared: float = 0.0
 
@@ -71,7 +72,7 @@ class Pvs:
         n = self.cell_count
         return float(len(self.cell) / (n * n)) if n else 0.0
 
-    def at_hand(self, size: NDArray[np.number]) -> NDArray[np.float64]:
+    def at_hand(self, size: NDArray[np.number]) -> Floats:
         """(C,) the sum of ``size`` (C,) over the cells that each may see."""
         if not self.cell_count:
             return np.zeros(0)
@@ -86,11 +87,11 @@ class Pvs:
         return over_places(share, self.viewers)
 
     @property
-    def viewers(self) -> NDArray[np.float64]:
+    def viewers(self) -> Floats:
         """(C,) m³ of each cell with standing room; the whole volume if not known."""
         return self.standing if len(self.standing) else self.volume
 
-    def to_matrix(self) -> NDArray[np.bool_]:
+    def to_matrix(self) -> Bools:
         """(C, C) dense matrix."""
         n = self.cell_count
         matrix = np.zeros((n, n), dtype=np.bool_)
@@ -98,7 +99,7 @@ class Pvs:
         return matrix
 
     @staticmethod
-    def from_matrix(matrix: NDArray[np.bool_], **attributes: Any) -> Pvs:
+    def from_matrix(matrix: Bools, **attributes: Any) -> Pvs:
         """From a (C, C) symmetric matrix, the diagonal taken as set; further attributes."""
         n = len(matrix)
         rest = matrix & ~np.eye(n, dtype=np.bool_)
@@ -144,7 +145,7 @@ class Pvs:
         )
 
 
-def over_places(values: NDArray[np.float64], volume: NDArray[np.float64]) -> tuple[float, float]:
+def over_places(values: Floats, volume: Floats) -> tuple[float, float]:
     """The mean of (C,) values of cells over all places, so that a cell counts by the (C,)
     ``volume`` of its standing room, and the maximum; (0, 0) without cells."""
     if not len(values):

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Ints
 from ptmtools.errors import InputError
 from ptmtools.scene.gltf.document import GltfDocument
 from ptmtools.scene.sandbox import require, run_in_sandbox, serve
@@ -47,7 +48,7 @@ class DracoPrimitive:
     data: the compressed stream.
     """
 
-    triangles: NDArray[np.int64]
+    triangles: Ints
     attributes: dict[int, NDArray[Any]]
     data: bytes
 

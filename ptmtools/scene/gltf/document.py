@@ -22,6 +22,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.glb import BINARY, COMPONENTS, ITEMS, MAGIC, elements, glb_chunks, meaning, natural
@@ -106,7 +107,7 @@ class GltfDocument:
             raise ValueError(f"{place} exceeds its buffer")
         return buffer, start, length
 
-    def values(self, index: int) -> NDArray[np.float64]:
+    def values(self, index: int) -> Floats:
         """(count, items) the values of an accessor, sparse ones included (section 3.6.2).
 
         Raises ValueError, LookupError or TypeError if it is damaged, LimitError PTM-L204.

@@ -16,8 +16,8 @@ from typing import Any, TypeAlias, TypeVar
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.gltf.compression import TranscodedBytes
 from ptmtools.scene.gltf.document import GltfDocument, data_uri, place_of
@@ -37,7 +37,7 @@ from ptmtools.scene.source import (
 TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
 T = TypeVar("T")
 #: A texture, and as `_placement`.
-_Placed: TypeAlias = "tuple[SourceTexture | None, str, NDArray[np.float64], bool]"
+_Placed: TypeAlias = "tuple[SourceTexture | None, str, Floats, bool]"
 
 _UNLIT, _GLOSSY = "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness"
 #: Loss of opacity of a surface that transmits all light: what it reflects remains.
@@ -63,11 +63,11 @@ class MaterialUse:
 
     index: int
     coords: str
-    matrix: NDArray[np.float64]
+    matrix: Floats
     see_through: bool
-    light: NDArray[np.float64]
+    light: Floats
     normal_coords: str | None = None
-    normal_matrix: NDArray[np.float64] | None = None
+    normal_matrix: Floats | None = None
     optional: bool = False
 
 
@@ -194,9 +194,7 @@ class GltfMaterialReader:
         texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
         return texture, *_placement(use)
 
-    def _emission_placement(
-        self, entry: dict[str, Any], place: str
-    ) -> tuple[str, NDArray[np.float64], bool]:
+    def _emission_placement(self, entry: dict[str, Any], place: str) -> tuple[str, Floats, bool]:
         return _placement(entry["emissiveTexture"])
 
     def _other(self, entry: dict[str, Any], place: str) -> _Placed | None:
@@ -207,7 +205,7 @@ class GltfMaterialReader:
 
     def _normal_texture(
         self, entry: dict[str, Any], name: str, place: str, placed: _Placed
-    ) -> tuple[NormalTexture | None, str | None, NDArray[np.float64] | None]:
+    ) -> tuple[NormalTexture | None, str | None, Floats | None]:
         """The normal map of a material with a texture ``placed``; and its coordinates and their
         matrix, None if they are those of the texture."""
         relief = None
@@ -223,7 +221,7 @@ class GltfMaterialReader:
 
     def _normal(
         self, entry: dict[str, Any], place: str
-    ) -> tuple[SourceTexture, float, str, NDArray[np.float64]] | None:
+    ) -> tuple[SourceTexture, float, str, Floats] | None:
         """The image of a normal map, its scale, and as `_placement`."""
         use = entry["normalTexture"]
         scale = _finite(use.get("scale", 1.0))
@@ -345,7 +343,7 @@ def _finite(value: Any) -> float:
     return float(value)
 
 
-def _placement(use: dict[str, Any]) -> tuple[str, NDArray[np.float64], bool]:
+def _placement(use: dict[str, Any]) -> tuple[str, Floats, bool]:
     """The attribute with the coordinates of a texture, their (2, 3) matrix, and whether the
     material defines that."""
     transform = use.get("extensions", {}).get("KHR_texture_transform", {})
@@ -353,7 +351,7 @@ def _placement(use: dict[str, Any]) -> tuple[str, NDArray[np.float64], bool]:
     return f"TEXCOORD_{coords}", _transform(transform), bool(transform)
 
 
-def _transform(extension: dict[str, Any]) -> NDArray[np.float64]:
+def _transform(extension: dict[str, Any]) -> Floats:
     """(2, 3) matrix of KHR_texture_transform: scale, then rotation, then offset.
 
     The direction of rotation is that of its text, its test model and the viewers; the GLSL sample

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.tolerance import PARALLEL_COSINE, Tolerance, rank
 
 #: Number of the largest triangles whose normals are candidate directions.
@@ -22,14 +23,12 @@ _BATCH = 4096
 _PERPENDICULAR = 1e-3
 
 
-def tolerance_of(
-    points: NDArray[np.float64], triangles: NDArray[np.integer], step: float = 0.0
-) -> Tolerance:
+def tolerance_of(points: Floats, triangles: NDArray[np.integer], step: float = 0.0) -> Tolerance:
     """The tolerances for (T, 3) triangles over (V, 3) points on a grid of this ``step``."""
     return Tolerance.for_points(points @ main_axes(points[triangles]).T, step)
 
 
-def main_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def main_axes(corners: Floats) -> Floats:
     """(3, 3) orthonormal rows, right-handed, of (T, 3, 3) triangles; the unit matrix if these are
     the coordinate axes, or without a second axis."""
     extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max()) if len(corners) else 0.0

@@ -67,7 +67,7 @@ class NamedFaces:
 
     level: Bools
     upright: Bools
-    doors: tuple[NDArray[np.int64], ...] = ()
+    doors: tuple[Ints, ...] = ()
 
     @staticmethod
     def from_names(
