@@ -200,7 +200,9 @@ def encode_image(
     Raises as `encode_steps` and `load_image`.
     """
     from ptmtools.texture import load_image, read_header
+    from ptmtools.texture.hidden import spread_colors
     from ptmtools.texture.images.files import check_depth
+    from ptmtools.texture.images.opening import LOSSY
     from ptmtools.texture.model import Description, Limits
     from ptmtools.texture.steps import encode_steps
 
@@ -208,7 +210,14 @@ def encode_image(
         picture = load_image(data, Limits(options.limit << 20))
         check_depth(picture)
         picture = replace(picture, description=Description())
-        height, width = picture.texels.shape[:2]
+        texels = picture.array()
+        visible = spread_colors(texels)
+        kept = visible is texels
+        if not kept:
+            # The file has other colours, so that it cannot be the finest level.
+            lossy = picture.lossy and picture.lossy._replace(format=LOSSY)
+            picture = replace(picture, texels=visible, lossy=lossy)
+        height, width = texels.shape[:2]
         levels = without_finest(options, unresolved, width, height)
         encoded = encode_steps(picture, data, levels, options)
     stem = name.rpartition(".")[0]
@@ -223,7 +232,7 @@ def encode_image(
     header = read_header(encoded.ptm)
     level, shared = fallback_image(encoded.steps, header, options.fallback_size)
     if options.fallback and shared is None:
-        png = _png(options, data, picture, encoded.ptm, level)
+        png = _png(options, data if kept else b"", picture, encoded.ptm, level)
         files.append((f"{SERVED}/{FOLDER}/{stem}.png", png))
     return files
 
@@ -231,7 +240,8 @@ def encode_image(
 def _png(
     options: TextureOptions, source: bytes, picture: Picture, data: bytes, level: int
 ) -> bytes:
-    """The fallback image, of a level that may be finer than those of the `.ptm` in ``data``."""
+    """The fallback image, of a level that may be finer than those of the `.ptm` in ``data``;
+    ``source``: the file that has the texels."""
     from ptmtools.texture import decode, read_header
     from ptmtools.texture.images import png_bytes
     from ptmtools.texture.images.bare import bare

@@ -391,11 +391,8 @@ class TexturesStage(Stage[None]):
 
     name = "textures"
     about = "Encode the model's images as progressive textures."
-    recipe = 8
-    changed = (
-        "images that are smaller than their levels, such as those with a palette, have their "
-        "finest level as lossless WebP"
-    )
+    recipe = 9
+    changed = "what alpha hides has the colours of what is visible around"
     options = TextureOptions
     opens_inputs = True
 
