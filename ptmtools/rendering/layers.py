@@ -5,6 +5,11 @@ surface behind, the nearest first. Where a material has a cutoff, texels of less
 and all others are opaque; other layers blend as their colours are encoded, the farthest first. A
 ray ends at an opaque texel, so that foliage costs no more than the leaves before the first.
 
+A cutoff tests texels of the finest level. The alpha of a coarser one is the share of these that are
+drawn, if they have alpha 0 or 1, and so is that of a look-up between texels that is as wide; tested
+again, a grille of which a quarter is bars would be gone from afar. So alpha itself is the share of
+a look-up of a texel of the next level or wider, and between these two the test fades into it.
+
 Each ray has its own order. The page draws whole batches by the distance of the middles of their
 boxes, so it differs where layers of several batches reach around each other.
 """
@@ -32,8 +37,9 @@ _BATCH = 1 << 18
 #: Least length of a normal, m²: a triangle without area has none.
 _FLAT = 1e-300
 
-#: (m,) alpha of the textures at the pixels of a sight, 0 to 1.
-Alpha = Callable[[Sight], Floats]
+#: At the pixels of a sight: (m,) alpha of their textures, 0 to 1, and (m,) the level of detail that
+#: has it, 0 for the finest of the texture.
+Alpha = Callable[[Sight], tuple[Floats, Floats]]
 #: Of the pixels of a sight and their (m, 1) shares: (m, 3) colours to be added, 0 to 255, and
 #: (m, 1) the shares of what is behind that these replace.
 Paint = Callable[[Sight, Floats], tuple[Floats, Floats]]
@@ -150,14 +156,16 @@ class Layers:
         triangle = met[drawn]
         share[drawn] = 1.0 if surfaces.opacity is None else surfaces.opacity[triangle]
         textured = drawn[surfaces.texture[triangle] >= 0]
+        detail = np.zeros(len(met))
         if len(textured):
             shown = sight._replace(triangle=met[textured], ray=sight.ray[ray[textured]])
-            share[textured] *= alpha(shown)
-        cutoff = np.zeros(len(met))
+            texel, detail[textured] = alpha(shown)
+            share[textured] *= texel
         if surfaces.cutoff is not None:
-            cutoff[drawn] = surfaces.cutoff[triangle]
-        share[share < np.maximum(cutoff, LEAST_ALPHA)] = 0
-        share[(share > 0) & (cutoff > 0)] = 1
+            tested = drawn[surfaces.cutoff[triangle] > 0]
+            passes = share[tested] >= surfaces.cutoff[met[tested]]
+            share[tested] += (1 - np.minimum(detail[tested], 1)) * (passes - share[tested])
+        share[share < LEAST_ALPHA] = 0
         return share
 
 

@@ -15,7 +15,7 @@ from ptmtools.light.model import PROBE_SIZE
 from ptmtools.output.representation import representations_in
 from ptmtools.output.served import Served
 from ptmtools.progress import Progress
-from ptmtools.rendering.footprints import show_colors
+from ptmtools.rendering.footprints import detail_of_pixels, footprints, show_colors
 from ptmtools.rendering.kernels import shade
 from ptmtools.rendering.light import lamps
 from ptmtools.rendering.normal_maps import show_bumps, show_relief
@@ -57,10 +57,10 @@ class SurfacePainter:
             color=np.ones_like(self._triangles.color),
         )
 
-    def alpha(self, sight: Sight) -> Floats:
-        """(n,) alpha, 0 to 1, of the textures of pixels that show one."""
+    def alpha(self, sight: Sight) -> tuple[Floats, Floats]:
+        """See `ptmtools.rendering.layers.Alpha`, of pixels that show a texture."""
         texture = self._triangles.texture[sight.triangle]
-        result = np.ones(len(texture))
+        result, detail = np.ones(len(texture)), np.zeros(len(texture))
         for number in np.unique(texture).tolist():
             if number not in self._alpha:
                 self._alpha[number] = self._read_alpha(number)
@@ -70,9 +70,14 @@ class SurfacePainter:
             rows = np.flatnonzero(texture == number)
             part = sight._replace(triangle=sight.triangle[rows], ray=sight.ray[rows])
             value = np.empty((len(rows), 3))
-            shade(part, self._alike, shows, self._loaded, self._columns(shows), value)
+            column = self._columns(shows)
+            shade(part, self._alike, shows, self._loaded, column, value)
             result[rows] = value[:, 0] / 255
-        return result
+            _, moves = footprints(part, np.arange(len(rows)), self._triangles)
+            levels = shows.pyramids.levels[0]
+            size = shows.pyramids.size[0, levels - 1]
+            detail[rows] = np.maximum(detail_of_pixels(moves, *size), levels - column[0])
+        return result, detail
 
     def load(self, *triangles: NDArray[np.integer]) -> None:
         """Decodes the textures of all triangles, -1 for none, that `colors` will be asked for."""

@@ -118,6 +118,10 @@ class _Textures(dict[int, Levels]):
         self[texture] = _levels(self._served, self._finest, texture)
         return self[texture]
 
+    def finer(self, texture: int) -> int:
+        """The number of levels that were not read of a texture."""
+        return len(sizes_of(self._served.index["textures"][texture])) - len(self[texture])
+
     def read(self, textures: Iterable[int]) -> None:
         """Reads several, by threads: the lock of the interpreter is free while levels are
         decoded."""
@@ -238,7 +242,7 @@ def _texels(textures: Mapping[int, Levels], sight: Sight, triangles: Triangles) 
     for number, levels in textures.items():
         rows = hit[texture == number]
         if len(rows):
-            colors[rows] = _sample_texels(sight, rows, triangles, levels)[:, :3]
+            colors[rows] = _sample_texels(sight, rows, triangles, levels)[0][:, :3]
     return colors
 
 
@@ -248,19 +252,25 @@ def _image(textures: Mapping[int, Levels], number: int) -> NDArray[np.uint8] | N
     return finest if finest.shape[1::-1] == PROBE_SIZE else None
 
 
-def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> Floats:
-    """(n,) alpha, 0 to 1, of the textures of pixels that show one."""
-    result, texture = np.ones(len(sight.triangle)), triangles.texture[sight.triangle]
+def _alpha(triangles: Triangles, textures: _Textures, sight: Sight) -> tuple[Floats, Floats]:
+    """See `ptmtools.rendering.layers.Alpha`, of pixels that show a texture."""
+    texture = triangles.texture[sight.triangle]
+    result, detail = np.ones(len(texture)), np.zeros(len(texture))
     for number in np.unique(texture).tolist():
-        if textures[number][0].shape[2] > 3:
+        levels = textures[number]
+        if levels[0].shape[2] > 3:
             rows = np.flatnonzero(texture == number)
-            result[rows] = _sample_texels(sight, rows, triangles, textures[number])[:, 3] / 255
-    return result
+            texels, detail[rows] = _sample_texels(sight, rows, triangles, levels)
+            result[rows] = texels[:, 3] / 255
+            detail[rows] += textures.finer(number)
+    return result, detail
 
 
-def _sample_texels(sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels) -> Floats:
+def _sample_texels(
+    sight: Sight, pixel: Ints, triangles: Triangles, levels: Levels
+) -> tuple[Floats, Floats]:
     """(n, 3) colours that some pixels show of a texture, or (n, 4) with alpha: between those of the
-    two levels next to the size of a pixel."""
+    two levels next to the size of a pixel. And (n,) their level of detail, 0 for the last."""
     uv, moves = footprints(sight, pixel, triangles)
     height, width = levels[-1].shape[:2]
     finest = len(levels) - 1
@@ -275,7 +285,7 @@ def _sample_texels(sight: Sight, pixel: Ints, triangles: Triangles, levels: Leve
             if len(rows):
                 texels = _bilinear(level, uv[rows], clamped[rows])
                 colors[rows] += texels * weight[rows, None]
-    return colors
+    return colors, detail
 
 
 def _bilinear(level: NDArray[np.uint8], uv: Floats, clamped: NDArray[np.bool_]) -> Floats:

@@ -56,16 +56,21 @@ def panes(rows: tuple[tuple[float, int, tuple[float, ...], float], ...]) -> Surf
 
 
 def shown(
-    surfaces: Surfaces, camera: RayCamera, eye: Floats, ahead: Floats, alpha: Floats | None = None
+    surfaces: Surfaces,
+    camera: RayCamera,
+    eye: Floats,
+    ahead: Floats,
+    texels: Floats | None = None,
 ) -> Floats:
-    """(n, 3) colours of the pixels of a view, of textures with ``alpha`` (T,), before 200."""
+    """(n, 3) colours of the pixels of a view before 200; ``texels`` (T, 2): alpha and level of
+    detail of the texture of each."""
 
     def colors(sight: Sight) -> Floats:
         return np.where((sight.triangle < 0)[:, None], 200, 255 * surfaces.color[sight.triangle])
 
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, eye, ahead)
     sight, layers = Layers(surfaces).split(
-        sight, lambda at: np.ones(0) if alpha is None else alpha[at.triangle]
+        sight, lambda at: (0, 0) if texels is None else tuple(texels[at.triangle].T)
     )
     result = colors(sight)
     blend(layers, sight, lambda at, share: (colors(at) * share, share), result)
@@ -164,7 +169,9 @@ def test_layers_are_painted_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> No
 
     camera = RayCamera(6, 4, 1.2, 1.5)
     sight = Caster(surfaces, transparent_of(surfaces)).look(camera, np.zeros(3), AHEAD)
-    sight, layers = Layers(surfaces).split(sight, lambda at: np.ones(len(at.ray)))
+    sight, layers = Layers(surfaces).split(
+        sight, lambda at: (np.ones(len(at.ray)), np.zeros(len(at.ray)))
+    )
     blend(layers, sight, paint, np.zeros((24, 3)))
     assert sizes == [3, 3, 7, 7, 7, 7, 7, 7]
     assert sum(array.nbytes for layer in layers for array in layer) == 12 * 2 * 24
@@ -197,18 +204,19 @@ def test_a_triangle_without_area_has_the_color_of_a_corner() -> None:
 
 @given(SEEDS)
 def test_textures_with_alpha_against_a_loop(seed: int) -> None:
-    """Up to as many layers as a ray meets; some blend, others are drawn or not by a cutoff; of some
-    leaves each side is a face of its own."""
+    """Up to as many layers as a ray meets; some blend, others are drawn or not by a cutoff, or
+    drawn in part at coarser levels; of some leaves each side is a face of its own."""
     random = np.random.default_rng(seed)
     count = int(random.integers(1, MOST + 1))
-    rows, cutoff, alpha = [], [], []
+    rows, cutoff, texels = [], [], []
     for k in range(count):
         sides = int(random.integers(-1, 3)) or 3
         opacity = float(random.choice([1.0, random.random()]))
         for side in (1, -1) if sides == 3 else (sides,):
             rows.append((1 + 0.01 * k, side, tuple(random.random(3)), opacity))
             cutoff.append(random.choice([0, LEAST_ALPHA, random.random()]))
-            alpha.append(random.choice([0, 1, random.random()], p=[0.4, 0.1, 0.5]))
+            alpha = random.choice([0, 1, random.random()], p=[0.4, 0.1, 0.5])
+            texels.append((alpha, random.choice([0, random.random(), 3])))
     surfaces = panes((*rows, (9.0, 2, (0.5, 0.5, 0.5), 1.0)))
     own = np.arange(len(rows) + 1) < len(rows)
     surfaces = replace(
@@ -218,16 +226,21 @@ def test_textures_with_alpha_against_a_loop(seed: int) -> None:
         transparent=own,
         cutoff=np.array([*cutoff, 0]),
     )
-    actual = shown(surfaces, RayCamera(3, 2, 1.0, 1.5), np.zeros(3), AHEAD, np.array([*alpha, 1]))
+    actual = shown(
+        surfaces, RayCamera(3, 2, 1.0, 1.5), np.zeros(3), AHEAD, np.array([*texels, (1, 0)])
+    )
     expected = np.full(3, 127.5)
     for k in reversed(range(len(rows))):
         _, side, color, share = rows[k]
         if side < 0:
             continue
-        share *= alpha[k] if surfaces.texture[k] >= 0 else 1
-        if share < max(cutoff[k], LEAST_ALPHA):
+        alpha, detail = texels[k] if surfaces.texture[k] >= 0 else (1, 0)
+        share *= alpha
+        if cutoff[k]:
+            part = min(detail, 1)
+            share = part * share + (1 - part) * (share >= cutoff[k])
+        if share < LEAST_ALPHA:
             continue
-        share = 1 if cutoff[k] else share
         expected = (1 - share) * expected + share * 255 * np.array(color)
     np.testing.assert_allclose(actual, np.repeat(expected[None], 6, axis=0), atol=1e-3)
 

@@ -133,7 +133,9 @@ def glossy(
 def sight_of(served: Served) -> tuple[Sight, Any]:
     caster = Caster(served.surfaces, transparent_of(served.surfaces))
     sight = caster.look(CAMERA, np.zeros(3), AHEAD)
-    return Layers(served.surfaces).split(sight, lambda at: np.ones(len(at.ray)))
+    return Layers(served.surfaces).split(
+        sight, lambda at: (np.ones(len(at.ray)), np.zeros(len(at.ray)))
+    )
 
 
 def chains(probe: np.ndarray = IMAGE) -> list[list[np.ndarray]]:
