@@ -12,8 +12,9 @@ const record = { adjacent: [], visible: [0], ach: [1], floor: 0, textures: [[0]]
 /** @param {{texture: any, octree: any, sight: number, share: number, there: number}} one */
 async function orderOf({ texture, octree, sight, share, there }) {
   const side = 2 ** (texture.ends.length - 1);
-  const row = { ...texture, width: side, height: side, components: 3, texelBytes: 3 };
-  const catalogue = catalogueOf({ textures: [row], cells: [{ box: [0, 0, 0, 1, 1, 1] }] });
+  const row = { ...texture, width: side, height: side, gpuTexelBytes: 4, color: [0, 0, 0] };
+  const cell = { box: [0, 0, 0, 1, 1, 1], recordBytes: 1000, geometryBytes: 4000 };
+  const catalogue = catalogueOf({ textures: [row], cells: [cell] });
   const client = new Client(catalogue, { budget: 1e9, policy: (some) => new Best(some) });
   const order = [], count = octree.ends.length;
   let levels = there;

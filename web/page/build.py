@@ -52,7 +52,7 @@ _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _WORD = re.compile(r"\[\[(\w+)\]\]")
 _LINE_END = re.compile(r"\s*\n\s*")
 #: Template strings with shaders, and what esbuild leaves in them.
-_SHADER = re.compile(r"`[^`]*\b(?:uniform|gl_Position|vec3)\b[^`]*`")
+_SHADER = re.compile(r"`[^`]*\b(?:uniform|gl_Position|vec[23])\b[^`]*`")
 _SHADER_REMARK = re.compile(r"\s*//[^\n]*")
 
 
@@ -116,7 +116,9 @@ def language_script(language: str) -> bytes:
 def plain_shader(shader: re.Match[str]) -> str:
     """A template string without comments, indentation and spaces around operators."""
     text = _LINE_END.sub("\n", _SHADER_REMARK.sub("", shader[0]))
-    return re.sub(r" ?([-+*/=,?:{}()]) ?", r"\1", text)
+    text = re.sub(r" ?([-+*/=,?:{}()<>;]) ?", r"\1", text)
+    text = re.sub(r"(?<=[;{}])\n", "", text)
+    return re.sub(r"\b0(?=\.\d*[1-9])|(?<=\d\.)0\b", "", text)
 
 
 def script(source: Path) -> bytes:

@@ -200,8 +200,8 @@ export class Light {
     return [
       corners.replace(/void main\(\) ?{/, cornersOf(reflects))
         .replace(/painted ?= ?paint\.rgb/, "painted = white > 0.0 ? pow(paint.rgb, vec3(4.0)) : paint.rgb"),
-      lit.replace("void main", fragmentsOf(this.row, reflects)).replace(/if ?\(shown\.a/, `${reflects ? GLASS : ""}$&`)
-        .replace(/glow ?= ?0\.25/, "glow = white > 0.0 ? 1.0 : 0.7"),
+      lit.replace("void main", fragmentsOf(this.row, reflects)).replace(/if ?\(cut/, `${reflects ? GLASS : ""}$&`)
+        .replace(/glow ?= ?0?\.25/, "glow = white > 0.0 ? 1.0 : 0.7"),
     ];
   }
 

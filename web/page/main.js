@@ -1,6 +1,7 @@
 // The entry of the page: reads the index, creates the application and runs its frames.
 
-import { DecoderWorkers, hasSimd, loadViewDecoder } from "../ptm/src/index.js";
+import { hasSimd, loadViewDecoder } from "../ptm/src/index.js";
+import { Workers } from "../ptm/src/workers.js";
 import { App } from "./app.js";
 import { readConfig, Site } from "./data/site.js";
 import { contextOf } from "./gl/context.js";
@@ -35,7 +36,7 @@ function decodersOf(config) {
   const create = () => new Worker(worker, { type: "module" }), wasm = compiled();
   const geometry = wasm.then(loadViewDecoder);
   geometry.catch(() => {}); // the first cell reports it
-  return { workers: new DecoderWorkers({ wasm, create }), geometry: () => geometry };
+  return { workers: new Workers({ wasm, create }), geometry: () => geometry };
 }
 
 async function main() {

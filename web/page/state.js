@@ -4,8 +4,8 @@ import { previews } from "./walk/textures.js";
 
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function stateOf(walk) {
-  const { client, memory, needs, picture, stream, stream: { estimate, fetcher } } = walk;
-  const levels = new Array(client.catalogue.K).fill(0);
+  const { client, index, memory, needs, picture, rows, stream, stream: { estimate, fetcher } } = walk;
+  const { K, memory: bytes } = client.catalogue, levels = new Array(K).fill(0);
   for (const held of memory.held) levels[held]++;
   return {
     cell: walk.cell,
@@ -14,14 +14,17 @@ export function stateOf(walk) {
     residentBytes: memory.bytes,
     peakBytes: memory.peak,
     budgetBytes: walk.budget,
-    paperBytes: paperBytes(walk),
+    // As the paper counts.
+    paperBytes: memory.held.reduce(
+      (sum, held, t) => sum + bytes[t * K + held] / rows[t].channels * index.textures[t].components, 0,
+    ),
     geometryBytes: picture.renderer.bytes,
     requests: fetcher.requests,
     bytes: fetcher.bytes + (stream.opening?.bytes ?? 0),
     pending: fetcher.pending,
     complete: walk.complete,
     exact: walk.exact,
-    previews: walk.rows.filter((_, t) => previews(walk, t)).length,
+    previews: rows.filter((_, t) => previews(walk, t)).length,
     fps: picture.fps,
     bandwidth: estimate.bandwidth,
     latency: estimate.latency,
@@ -32,12 +35,4 @@ export function stateOf(walk) {
     levels,
     held: Array.from(memory.held),
   };
-}
-
-/** Bytes in texture memory, as the paper counts. @param {import("./walkthrough.js").Walkthrough} walk */
-function paperBytes({ index, rows, memory }) {
-  return index.textures.reduce((sum, { components }, t) => {
-    const texels = rows[t].sizes.slice(0, memory.held[t]);
-    return sum + components * texels.reduce((all, { width, height }) => all + width * height, 0);
-  }, 0);
 }

@@ -15,7 +15,7 @@ import { fill } from "./words/language.js";
 /** @typedef {import("./data/site.js").CellRecord} CellRecord */
 /** @typedef {import("./data/glb.js").Shape} Shape */
 /** @typedef {import("../ptm/src/meshopt.js").ViewDecoder} ViewDecoder */
-/** @typedef {{workers: import("../ptm/src/workers.js").DecoderWorkers, geometry: () => Promise<ViewDecoder>}} Decoders */
+/** @typedef {{workers: import("../ptm/src/workers.js").Workers, geometry: () => Promise<ViewDecoder>}} Decoders */
 
 /** Seconds until a failed file is requested again. */
 const REST = 10;

@@ -1,15 +1,14 @@
 // The drawing context of a page.
 
 /**
- * Smooth edges cost too much without a graphics card.
+ * Smooth edges cost too much without a graphics card. Nothing behind the canvas shows through.
  * @param {HTMLCanvasElement} canvas
  * @param {boolean} [low] whether the visitor asks for less quality
  */
 export function contextOf(canvas, low) {
-  const options = { antialias: true, failIfMajorPerformanceCaveat: true };
-  const plain = { antialias: false };
-  const gl = (low ? null : canvas.getContext("webgl2", options)) ?? canvas.getContext("webgl2", plain);
-  return /** @type {WebGL2RenderingContext | null} */ (gl);
+  const context = (/** @type {boolean} */ antialias) =>
+    canvas.getContext("webgl2", { alpha: false, antialias, failIfMajorPerformanceCaveat: antialias });
+  return (low ? null : context(true)) ?? context(false);
 }
 
 /** UNMASKED_RENDERER_WEBGL. */

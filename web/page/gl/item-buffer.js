@@ -113,7 +113,7 @@ export class ItemBuffer {
         const { texture, light, probe, blends, twoSided } = batch.look, pair = [texture, light, probe], key = pair.join();
         if (!items.has(key)) items.set(key, this.#pairs.push(pair));
         if (blends && texture < 0) continue;
-        (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
+        gl[twoSided ? "disable" : "enable"](gl.CULL_FACE);
         gl.uniform1f(item.at.item, /** @type {number} */ (items.get(key)));
         const { width, height } = rows[texture] ?? { width: 1, height: 1 };
         gl.uniform2f(item.at.size, width, height);

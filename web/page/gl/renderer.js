@@ -3,6 +3,7 @@
 import { CellBuffers, pack } from "./cell-buffers.js";
 import { aim, programOf } from "./program.js";
 import { SURFACES } from "./shaders.js";
+import { levelSizes } from "../../client/src/levels.js";
 
 /** @typedef {import("./cell-buffers.js").Batch} Batch */
 /** @typedef {import("../data/glb.js").Shape} Shape */
@@ -35,6 +36,8 @@ export class Renderer {
     this.gl = gl;
     this.memory = memory;
     this.means = rows.map(({ color }) => color.map((part) => part / 255));
+    this.widths = rows.map((row) => levelSizes(row).at(-1)?.width ?? 1);
+    this.samples = gl.getParameter(gl.SAMPLES) || 1;
     /** Light of the site, once its script is here. @type {import("../light.js").Light | null} */
     this.light = null;
     this.surface = this.compile("surface");
@@ -156,7 +159,7 @@ export class Renderer {
     if (use !== this.#used) aim(gl, (this.#used = use), camera);
     // Glass comes with its reflection, which does not fade with its colour.
     const source = mirror && !look.white ? gl.ONE : gl.SRC_ALPHA;
-    gl.blendFuncSeparate(source, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.blendFunc(source, gl.ONE_MINUS_SRC_ALPHA);
     const fading = this.#paint(use.at, batch, now);
     buffers.draw(batch);
     return fading;
@@ -171,15 +174,17 @@ export class Renderer {
   #paint(at, batch, now) {
     const { gl } = this;
     const { texture, clampU, clampV, cutoff, twoSided } = batch.look;
-    (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
+    gl[twoSided ? "disable" : "enable"](gl.CULL_FACE);
+    gl[cutoff ? "enable" : "disable"](gl.SAMPLE_ALPHA_TO_COVERAGE);
     gl.uniform4fv(at.color, batch.color);
-    gl.uniform1f(at.cutoff, cutoff);
     gl.uniform1i(at.textured, +(texture >= 0));
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);
     if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
     const fading = this.light?.paint(this, at, batch.look, now);
-    return /** @type {boolean} */ (storage?.bind(clampU, clampV, now) || fading);
+    const fades = storage?.bind(clampU, clampV, now);
+    gl.uniform3f(at.cut, cutoff, storage ? this.widths[texture] * 2 ** storage.left : 1, this.samples);
+    return /** @type {boolean} */ (fades || fading);
   }
 }
 

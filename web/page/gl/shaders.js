@@ -25,6 +25,7 @@ void main() {
 /** The texel of a surface; one or two channels are grey, the second is alpha. */
 export const TEXEL = `
 uniform sampler2D map;
+uniform vec3 cut; // least alpha, or 0; texels across the finest level, twice for each that fades in; samples of a pixel
 uniform int channels; // 0: no level is present
 uniform vec4 color;
 uniform vec3 mean;
@@ -37,6 +38,21 @@ vec4 texel() {
 }`;
 
 /**
+ * Texels of the finest level are drawn or not, by their alpha; that of coarser ones is the share of these that are
+ * drawn (docs/formats/hints.md#alpha): so many samples of the pixel, of which noise rounds the number. The noise
+ * (Jimenez 2014, interleaved gradient) changes with the distance, lest a surface hide the same samples of the next.
+ */
+export const CUT = `
+  if (cut.x > 0.0) {
+    vec2 size = vec2(textureSize(map, 0));
+    float wide = max(length(dFdx(uv) * size), length(dFdy(uv) * size));
+    float detail = min(1.0, log2(cut.y / size.x * max(1.0, wide)));
+    float noise = fract(53.0 * fract(dot(vec3(gl_FragCoord.xy, seen.z), vec3(0.0671, 0.00584, 0.03))));
+    shown.a = floor(mix(step(cut.x, shown.a), shown.a, detail) * cut.z + noise) / cut.z;
+  }
+  if (shown.a < 0.004) discard;`;
+
+/**
  * Surfaces with a texture are unlit, as in VRML browsers; the rest glow a little and are lit from the eye. Colours
  * multiply as they are encoded. `Light` changes this one, and others with the same expressions.
  */
@@ -45,7 +61,6 @@ precision highp float;
 in vec3 seen;
 in vec2 uv;
 in vec3 painted;
-uniform float cutoff;
 out vec4 shown;
 ${TEXEL}
 void main() {
@@ -58,9 +73,7 @@ void main() {
     float size = length(normal);
     light = glow + (1.0 - glow) * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
   }
-  shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);
-  if (shown.a < max(cutoff, 0.004)) discard;
-  if (cutoff > 0.0) shown.a = 1.0;
+  shown = vec4(sampled.rgb * color.rgb * painted * light, sampled.a * color.a);${CUT}
 }`;
 
 /** Numbers of 16 bits in two channels of 8. */

@@ -26,8 +26,9 @@ function formats(gl, channels) {
 }
 
 export class Storage {
-  /** Share of the finest level that is still to fade in, from 1 to 0. */
+  /** Levels that are to fade in, and how many are left of them now. */
   #fading = 0;
+  left = 0;
   #since = 0;
   #wrap = -1;
 
@@ -103,9 +104,9 @@ export class Storage {
       }
     }
     if (!this.#fading) return false;
-    const left = this.#fading * Math.max(0, 1 - (now - this.#since) / FADE);
-    gl.texParameterf(gl.TEXTURE_2D, gl.TEXTURE_MIN_LOD, left > 0 ? left : -1000);
-    if (left === 0) this.#fading = 0;
+    const left = this.left = this.#fading * Math.max(0, 1 - (now - this.#since) / FADE);
+    gl.texParameterf(gl.TEXTURE_2D, gl.TEXTURE_MIN_LOD, left || -1000);
+    if (!left) this.#fading = 0;
     return left > 0;
   }
 

@@ -4,7 +4,7 @@ import { levelSizes } from "../../client/src/levels.js";
 import { loadLater } from "../load-later.js";
 
 /** @typedef {import("../../ptm/src/level-decoder.js").Image} Image */
-/** @typedef {import("../../ptm/src/workers.js").DecoderWorkers} DecoderWorkers */
+/** @typedef {import("../../ptm/src/workers.js").Workers} Workers */
 
 export class PreviewFile {
   /** All bytes, once they have arrived. @type {Uint8Array<ArrayBuffer> | null} */
@@ -15,7 +15,7 @@ export class PreviewFile {
    * @param {number} texture
    * @param {import("../data/site.js").TextureRow} all the row of that texture
    * @param {number} place among the previews of the site
-   * @param {DecoderWorkers} workers
+   * @param {Workers} workers
    */
   constructor(row, texture, all, place, workers) {
     this.row = row;
@@ -44,7 +44,7 @@ export class PreviewFile {
  * The previews of an index, in its order.
  * @param {import("../data/site.js").Index} index what the GPU can hold of `site`
  * @param {import("../data/site.js").Index} site
- * @param {DecoderWorkers} workers
+ * @param {Workers} workers
  */
 export function previewsOf({ textures }, site, workers) {
   const files = site.textures.flatMap(({ previews = [] }) => previews.map(({ file }) => file));

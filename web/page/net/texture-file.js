@@ -4,7 +4,7 @@ import { PtmError } from "../../ptm/src/index.js";
 import { levelSizes } from "../../client/src/levels.js";
 
 /** @typedef {import("../../ptm/src/level-decoder.js").Image} Image */
-/** @typedef {import("../../ptm/src/workers.js").DecoderWorkers} DecoderWorkers */
+/** @typedef {import("../../ptm/src/workers.js").Workers} Workers */
 
 export class TextureFile {
   #bytes = new Uint8Array(0);
@@ -13,7 +13,7 @@ export class TextureFile {
 
   /**
    * @param {import("../data/site.js").TextureRow} row
-   * @param {DecoderWorkers} workers
+   * @param {Workers} workers
    */
   constructor(row, workers) {
     this.row = row;

@@ -44,16 +44,13 @@ import { meshesOf } from "./meshes.js";
 /**
  * The parts of an index that are read here (docs/formats/hints.md).
  * @typedef {object} Index
- * @property {{width: number, height: number, components: number, texelBytes: number,
- *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[],
+ * @property {{width: number, height: number, gpuTexelBytes: number, ends: number[],
+ *   differences: number[], color: number[],
  *   previews?: {level: number, width: number, height: number, bytes: number, difference: number,
  *   exact?: boolean}[], probe?: object}[]} textures
  * @property {Parameters<typeof meshesOf>[0]} [meshes]
- * @property {{box: number[], recordBytes?: number, geometryBytes?: number}[]} cells
+ * @property {{box: number[], recordBytes: number, geometryBytes: number}[]} cells
  */
-
-const RECORD_BYTES = 1000, GEOMETRY_BYTES = 4000;
-const GREY = [128, 128, 128];
 
 /**
  * @param {Index} index
@@ -67,15 +64,14 @@ export function catalogueOf({ textures, cells, meshes = [] }) {
   const [ends, memory, differences] = [0, 0, 0].map(() => new Float64Array(T * K));
   let whole = 0;
   textures.forEach((texture, t) => {
-    const { components, texelBytes } = texture, sizes = levelSizes(texture);
-    const texel = texture.gpuTexelBytes ?? (components === 3 ? (texelBytes / 3) * 4 : texelBytes);
+    const sizes = levelSizes(texture);
     // Coarser levels of a probe are of no use.
     const first = texture.probe ? levels[t] : 1;
     for (let k = 1; k < K; k++) {
       const at = t * K + k, size = sizes[k - 1];
       ends[at] = texture.ends[k - 1] ?? ends[at - 1];
-      memory[at] = memory[at - 1] + (size ? size.width * size.height * texel : 0);
-      differences[at] = size && k >= first ? Math.max(texture.differences?.[k - 1] ?? 0, LEAST_DIFFERENCE) : 0;
+      memory[at] = memory[at - 1] + (size ? size.width * size.height * texture.gpuTexelBytes : 0);
+      differences[at] = size && k >= first ? Math.max(texture.differences[k - 1] ?? 0, LEAST_DIFFERENCE) : 0;
     }
     whole += memory[t * K + K - 1];
   });
@@ -83,11 +79,11 @@ export function catalogueOf({ textures, cells, meshes = [] }) {
   return {
     T, C, K, levels, stored, ends, memory, differences, whole, previews,
     gains: gainsOf(differences, K, previews), meshes: meshesOf(meshes),
-    colors: Float64Array.from(textures.flatMap((texture) => texture.color ?? GREY)),
+    colors: Float64Array.from(textures.flatMap(({ color }) => color)),
     low: Float64Array.from(cells.flatMap((cell) => cell.box.slice(0, 3))),
     high: Float64Array.from(cells.flatMap((cell) => cell.box.slice(3))),
-    recordBytes: Float64Array.from(cells, (cell) => cell.recordBytes ?? RECORD_BYTES),
-    geometryBytes: Float64Array.from(cells, (cell) => cell.geometryBytes ?? GEOMETRY_BYTES),
+    recordBytes: Float64Array.from(cells, ({ recordBytes }) => recordBytes),
+    geometryBytes: Float64Array.from(cells, ({ geometryBytes }) => geometryBytes),
   };
 }
 

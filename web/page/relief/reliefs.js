@@ -6,7 +6,7 @@
 
 import { codeOf, lookOf } from "../gl/cell-buffers.js";
 import { aim } from "../gl/program.js";
-import { corners, SURFACES, TEXEL } from "../gl/shaders.js";
+import { corners, CUT, SURFACES, TEXEL } from "../gl/shaders.js";
 import { PageError } from "../net/errors.js";
 import { LIT } from "./lamp.js";
 import { distance } from "../space/frustum.js";
@@ -38,16 +38,13 @@ in vec3 painted;
 in vec2 at;
 in mat3 axes;
 uniform sampler2D relief;
-uniform float cutoff;
 out vec4 shown;
 ${TEXEL}
 ${LIT}
 void main() {
   vec4 sampled = textured ? texel() : vec4(1.0);
   vec3 normal = normalize(axes * (texture(relief, at).rgb * 2.0 - 1.0));
-  shown = vec4(sampled.rgb * color.rgb * painted * lit(normal), sampled.a * color.a);
-  if (shown.a < max(cutoff, 0.004)) discard;
-  shown.a = 1.0;
+  shown = vec4(sampled.rgb * color.rgb * painted * lit(normal), sampled.a * color.a);${CUT}
 }`;
 
 /** The surface has a uniform of that name. */

@@ -8,4 +8,4 @@ export { DEFAULT_MEMORY, LevelDecoder, memoryNeeded } from "./level-decoder.js";
 export { Ptm, openPtm } from "./open.js";
 export { decodePreview } from "./preview.js";
 export { serve } from "./serve.js";
-export { DecoderWorkers } from "./workers.js";
+export { DecoderWorkers } from "./remote-decoder.js";

@@ -24,7 +24,7 @@ import { LevelDecoder } from "./level-decoder.js";
  *   to?: number,
  *   signal?: AbortSignal,
  *   engine?: import("./engine.js").Engine,
- *   workers?: import("./workers.js").DecoderWorkers,
+ *   workers?: import("./remote-decoder.js").DecoderWorkers,
  * }} DecodeOptions
  *   `to`: the finest level that is wanted; it is an error then if it is not whole in the file.
  *   `workers` or, without them, `engine` decode; by default this thread, by `loadEngine`.

@@ -2,7 +2,6 @@
 
 import { PtmError } from "./errors.js";
 
-/** @typedef {import("./container.js").Header} Header */
 /** @typedef {import("./level-decoder.js").Image} Image */
 /** @typedef {import("./level-decoder.js").DecoderOptions} DecoderOptions */
 /** @typedef {import("./engine.js").ModuleSource} ModuleSource */
@@ -17,7 +16,7 @@ import { PtmError } from "./errors.js";
  */
 
 /** Bytes on their way through a worker. */
-class Task {
+export class Task {
   /** @param {{bytes: Uint8Array, decoder: number} | {bytes: Uint8Array, ends: number[], levels: number,
    *   options: DecoderOptions} | {bytes: Uint8Array, preview: PreviewOptions}} order */
   constructor(order) {
@@ -125,64 +124,8 @@ class Lane {
   }
 }
 
-/** As `LevelDecoder`, in a worker. */
-class RemoteDecoder {
-  /** @type {Task | undefined} */
-  #task;
-  #asked = false;
-
-  /**
-   * @param {Lane} lane
-   * @param {number} number
-   */
-  constructor(lane, number) {
-    this.lane = lane;
-    this.number = number;
-    /** The level decoded last, -1 at first. */
-    this.level = -1;
-  }
-
-  /**
-   * The next level from its group, as `LevelDecoder.refine`; one at a time. A level aborted while
-   * a worker decodes it is not lost: the next call returns it, whatever bytes it is given.
-   * @param {Uint8Array} data all bytes of the group
-   * @param {{signal?: AbortSignal}} [options] rejects with the signal's reason
-   * @returns {Promise<Image>}
-   */
-  async refine(data, { signal } = {}) {
-    signal?.throwIfAborted();
-    if (this.#asked) throw new Error("a level is being decoded already");
-    this.#asked = true;
-    let task = this.#task;
-    if (!task) {
-      task = this.#task = new Task({ decoder: this.number, bytes: data });
-      this.lane.add(task);
-    }
-    try {
-      const [image] = await unlessAborted(task.images, signal);
-      this.level = image.level;
-      this.#task = undefined;
-      return image;
-    } catch (error) {
-      if (!signal?.aborted || this.lane.callOff(task)) this.#task = undefined;
-      throw error;
-    } finally {
-      this.#asked = false;
-    }
-  }
-
-  /** Ends the decoder and frees its memory in the worker. */
-  close() {
-    if (this.#task) this.lane.callOff(this.#task);
-    this.lane.decoders--;
-    this.lane.send({ decoder: this.number });
-  }
-}
-
-/** Workers that share the decoding of many files. */
-export class DecoderWorkers {
-  #decoders = 0;
-
+/** Workers that share the decoding of many files, each in one go. */
+export class Workers {
   /** @param {WorkersOptions} [options] */
   constructor({ count, wasm, create } = {}) {
     const processors = globalThis.navigator?.hardwareConcurrency ?? 2;
@@ -200,19 +143,6 @@ export class DecoderWorkers {
   /** Whether no worker can decode files. */
   get failed() {
     return this.lanes.every(({ failure, useless }) => failure ?? useless);
-  }
-
-  /**
-   * A decoder of a file, in the worker that has the fewest, of those that have not failed.
-   * @param {Header} header
-   * @param {DecoderOptions} [options]
-   */
-  decoder(header, options = {}) {
-    const lane = this.#lane();
-    lane.decoders++;
-    const number = this.#decoders++;
-    lane.send({ decoder: number, header, options });
-    return new RemoteDecoder(lane, number);
   }
 
   /**
@@ -238,14 +168,14 @@ export class DecoderWorkers {
 
   /** @param {Task} task */
   async #carryOut(task) {
-    const lane = this.#lane();
+    const lane = this.lane();
     lane.decoders++;
     lane.add(task);
     return task.images.finally(() => lane.decoders--);
   }
 
   /** The worker that has the fewest decoders, of those that have not failed. */
-  #lane() {
+  lane() {
     const able = this.lanes.filter(({ failure, useless }) => !failure && !useless);
     return (able.length ? able : this.lanes).reduce(
       (one, other) => (other.decoders < one.decoders ? other : one),
@@ -257,19 +187,4 @@ export class DecoderWorkers {
     for (const { port } of this.lanes) (port.terminate ?? port.close)?.call(port);
     for (const lane of this.lanes) lane.fail(new Error("the workers were closed"));
   }
-}
-
-/**
- * @template T
- * @param {Promise<T>} promise
- * @param {AbortSignal} [signal]
- * @returns {Promise<T>}
- */
-function unlessAborted(promise, signal) {
-  if (!signal) return promise;
-  return new Promise((resolve, reject) => {
-    const stop = () => reject(signal.reason);
-    signal.addEventListener("abort", stop, { once: true });
-    promise.then(resolve, reject).finally(() => signal.removeEventListener("abort", stop));
-  });
 }

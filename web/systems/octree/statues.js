@@ -4,7 +4,7 @@
 import { clock } from "../../page/net/fetcher.js";
 import { PageError } from "../../page/net/errors.js";
 import { aim } from "../../page/gl/program.js";
-import { corners, TEXEL } from "../../page/gl/shaders.js";
+import { corners, CUT, TEXEL } from "../../page/gl/shaders.js";
 import { distance } from "../../page/space/frustum.js";
 import { LIT } from "../../page/relief/lamp.js";
 import { LOOK_UP } from "./look-up.js";
@@ -30,7 +30,6 @@ in vec3 seen;
 in vec2 uv;
 in vec3 painted;
 in vec3 q;
-uniform float cutoff;
 out vec4 shown;
 ${TEXEL}
 ${LOOK_UP}
@@ -39,9 +38,7 @@ void main() {
   int stop = stopDepth(q);
   vec4 sampled = textured ? texel() : vec4(1.0);
   vec3 normal = normalize(vec3(texel(octree, addressAt(q, stop)).rgb) / 127.5 - 1.0);
-  shown = vec4(sampled.rgb * color.rgb * painted * lit(normal), sampled.a * color.a);
-  if (shown.a < max(cutoff, 0.004)) discard;
-  shown.a = 1.0;
+  shown = vec4(sampled.rgb * color.rgb * painted * lit(normal), sampled.a * color.a);${CUT}
 }`;
 
 /** @typedef {import("../../page/gl/renderer.js").Drawn} Drawn */

@@ -15,6 +15,7 @@ const DECODING = 3;
 /** The image of the first files of a set, as the renderer draws from it. */
 class Joined {
   #wrap = -1;
+  left = 0;
 
   /** @param {WebGL2RenderingContext} gl @param {TextureSet} set */
   constructor(gl, set) {
