@@ -8,6 +8,10 @@ that opaque and blended materials share remains one image.
 Mirrored repetition is in no emitted form either. Most surfaces with such a texture lie within one
 repetition; there the coordinates are mirrored instead, exactly. Otherwise the image is doubled,
 with its mirror image beside it, and repeats normally.
+
+From afar the alpha of an image with a cutoff counts as the share of its texels that are drawn
+(`ptmtools.rendering.layers`). Ramps of alpha over many texels, and even alpha between 0 and 1, are
+no such shares, so they become steps a texel wide where they cross the cutoff.
 """
 
 from __future__ import annotations
@@ -29,6 +33,8 @@ from ptmtools.scene.source import SourceMaterial, SourceTexture, SourceWrap
 from ptmtools.scene.texels import uses_holes
 
 _BANDS = {"r": 0, "g": 1, "b": 2}
+#: Share of soft texels in an image whose alpha becomes steps: less are edges, which stay.
+_SOFT = 0.05
 
 
 def bake(
@@ -53,9 +59,14 @@ def bake(
     """
     textures = [material.texture for material in materials]
     store.examine(filter(None, textures), workers, progress)
-    baked = [
-        _merge_mask(replace(material, texture=texture and store.convert(texture)), store, notes)
+    converted = [
+        replace(material, texture=texture and store.convert(texture))
         for material, texture in zip(materials, textures, strict=True)
+    ]
+    soft: dict[Callable[[], bytes], bool] = {}
+    baked = [
+        _step_alpha(_merge_mask(material, store, notes), store, notes, soft)
+        for material in converted
     ]
     copied = False
     for number, rows in enumerate(faces):
@@ -155,6 +166,66 @@ def _merge_mask(material: SourceMaterial, store: ImageStore, notes: IngestNotes)
         return replace(without, see_through=True)
     notes.note("PTM-N215", f"{mask.what}: baked into an image as its alpha", mask.place)
     return replace(without, texture=merged)
+
+
+@dataclass(frozen=True)
+class SteppedBytes:
+    """The bytes of a PNG of an image whose alpha is 0.5 where it was ``cutoff``, and 0 or 1 beyond
+    a texel from there. ``limit`` and errors as of `MaskedBytes`."""
+
+    read: Callable[[], bytes]
+    cutoff: float
+    limit: int
+
+    def __call__(self) -> bytes:
+        picture = integers(self.read(), self.limit)
+        texels = picture.array()
+        alpha, most = texels[..., -1], np.iinfo(texels.dtype).max
+        slope = np.maximum(_spans(alpha) / 2, 1)
+        stepped = np.clip(0.5 + (alpha - self.cutoff * most) / slope, 0, 1) * most
+        alpha = np.rint(stepped).astype(texels.dtype)
+        return derived_png(picture, np.concatenate([_colors(texels), alpha[..., None]], axis=2))
+
+
+def _spans(alpha: NDArray[Any]) -> NDArray[Any]:
+    """(h, w) differences of the greatest and the least of the 3 × 3 texels around each."""
+    ends = []
+    for end in (np.maximum, np.minimum):
+        rows = np.pad(alpha, 1, mode="edge")
+        rows = end(end(rows[:-2], rows[1:-1]), rows[2:])
+        ends.append(end(end(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
+    return np.asarray(ends[0] - ends[1])
+
+
+def _is_soft(data: bytes, limit: int) -> bool:
+    """Whether the alpha of many texels lies between 0 and 1, as does that of all around them."""
+    texels = integers(data, limit).array()
+    alpha, most = texels[..., -1], np.iinfo(texels.dtype).max
+    within = (alpha > 0) & (alpha < most) & (_spans(alpha) < most / 2)
+    return bool(within.mean() > _SOFT)
+
+
+def _step_alpha(
+    material: SourceMaterial,
+    store: ImageStore,
+    notes: IngestNotes,
+    soft: dict[Callable[[], bytes], bool],
+) -> SourceMaterial:
+    """A material with a cutoff whose image is soft, as ``soft`` remembers, with steps of alpha."""
+    texture, cutoff = material.texture, material.cutoff
+    if texture is None or not cutoff:
+        return material
+    image = store.record(texture)
+    if image is None or image.bits is None:
+        return material
+    if texture.read not in soft:
+        soft[texture.read] = _is_soft(texture.read(), store.limit)
+    baked = replace(texture, read=SteppedBytes(texture.read, cutoff, store.limit))
+    if not soft[texture.read] or store.record(baked) is None:
+        return material
+    store.mark_as_input(texture)
+    notes.note("PTM-N215", f"{texture.what}: steps baked in for soft alpha", texture.place)
+    return replace(material, texture=baked, cutoff=0.5)
 
 
 @dataclass(frozen=True)

@@ -158,6 +158,26 @@ def test_an_image_of_opaque_and_of_blended_materials_becomes_two(put: Put) -> No
     assert np.array_equal(pixels_of(scene, 1), pixels)
 
 
+@pytest.mark.parametrize("cutoff", [0.3, 0.6])
+def test_soft_alpha_with_a_cutoff_becomes_steps(put: Put, cutoff: float) -> None:
+    """Even alpha all or nothing, and a ramp a step where it crosses the cutoff; the image of
+    blended materials stays as it is."""
+    pixels = np.full((16, 64, 4), 255, np.uint8)
+    ramp = np.linspace(0, 255, 64).round().astype(np.uint8)
+    pixels[:4, :, 3], pixels[4:8, :, 3], pixels[8:, :, 3] = 100, 200, ramp
+    doc = with_modes(GltfModel(), pixels, "BLEND", "MASK")
+    doc.tree["materials"][1]["alphaCutoff"] = cutoff
+    scene = ingest(put("a.glb", doc.glb()))
+    assert np.array_equal(pixels_of(scene, 0), pixels)
+    assert scene.materials[1].cutoff == 0.5
+    stepped = pixels_of(scene, 1)[..., 3]
+    assert (stepped[:3] == 255 * (100 >= cutoff * 255)).all()
+    assert (stepped[5:7] == 255).all()
+    assert ((stepped[10:] >= 128) == (ramp >= cutoff * 255)).all()
+    assert ((stepped[10:] > 0) & (stepped[10:] < 255)).sum(axis=1).max() <= 2
+    assert says(scene, "soft alpha")
+
+
 def test_an_image_stays_one_where_opaque_materials_use_opaque_texels(put: Put) -> None:
     """As of an atlas; its bytes are kept."""
     pixels = noise(1, bands=4)

@@ -217,8 +217,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 18
-    changed = "images and files of more kinds are read"
+    recipe = 19
+    changed = "soft alpha with a cutoff becomes steps"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True
