@@ -171,7 +171,7 @@ def test_soft_alpha_with_a_cutoff_becomes_steps(put: Put, cutoff: float) -> None
     assert np.array_equal(pixels_of(scene, 0), pixels)
     assert scene.materials[1].cutoff == 0.5
     stepped = pixels_of(scene, 1)[..., 3]
-    assert (stepped[:3] == 255 * (100 >= cutoff * 255)).all()
+    assert (stepped[:3] == 255 * (cutoff * 255 <= 100)).all()
     assert (stepped[5:7] == 255).all()
     assert ((stepped[10:] >= 128) == (ramp >= cutoff * 255)).all()
     assert ((stepped[10:] > 0) & (stepped[10:] < 255)).sum(axis=1).max() <= 2

@@ -5,6 +5,7 @@ import { BufferAttribute, ClampToEdgeWrapping, Color, Mesh, MeshBasicMaterial, R
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
 import { loadViewDecoder } from "ptm-decoder";
+import { cut } from "./cutout.js";
 import { glaze, illuminate } from "./light.js";
 import { bump, relieve } from "./relief.js";
 
@@ -144,6 +145,7 @@ export class CellLoader {
     const mirrored = seen && { ...seen, metallic: metalness, roughness };
     if (white) illuminate(look, white, this.#light, this.#exposure, mirrored);
     else if (mirrored && transparent && !map) glaze(look, this.#light, this.#exposure, mirrored);
+    if (alphaTest && map) cut(look, map);
     return look;
   }
 }

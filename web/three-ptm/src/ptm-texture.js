@@ -120,6 +120,11 @@ export class PtmTexture extends DataTexture {
     renderer.domElement.addEventListener("webglcontextrestored", this.#restored);
   }
 
+  /** Texels across its finest level; 0 without `sizes`. */
+  get finest() {
+    return this.#options.sizes?.at(-1)?.width ?? 0;
+  }
+
   /** Its bytes on the GPU: while storage is exchanged, of the old and the new. */
   get gpuBytes() {
     return [...this.#storages.values()].reduce((sum, bytes) => sum + bytes, 0);
