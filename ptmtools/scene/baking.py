@@ -180,10 +180,10 @@ class SteppedBytes:
     def __call__(self) -> bytes:
         picture = integers(self.read(), self.limit)
         texels = picture.array()
-        alpha, most = texels[..., -1], np.iinfo(texels.dtype).max
+        alpha, opaque = texels[..., -1], np.iinfo(texels.dtype).max
         slope = np.maximum(_spans(alpha) / 2, 1)
-        stepped = np.clip(0.5 + (alpha - self.cutoff * most) / slope, 0, 1) * most
-        alpha = np.rint(stepped).astype(texels.dtype)
+        steps = np.clip(0.5 + (alpha - self.cutoff * opaque) / slope, 0, 1)
+        alpha = np.rint(opaque * steps).astype(texels.dtype)
         return derived_png(picture, np.concatenate([_colors(texels), alpha[..., None]], axis=2))
 
 
@@ -200,8 +200,8 @@ def _spans(alpha: NDArray[Any]) -> NDArray[Any]:
 def _is_soft(data: bytes, limit: int) -> bool:
     """Whether the alpha of many texels lies between 0 and 1, as does that of all around them."""
     texels = integers(data, limit).array()
-    alpha, most = texels[..., -1], np.iinfo(texels.dtype).max
-    within = (alpha > 0) & (alpha < most) & (_spans(alpha) < most / 2)
+    alpha, opaque = texels[..., -1], np.iinfo(texels.dtype).max
+    within = (alpha > 0) & (alpha < opaque) & (_spans(alpha) < opaque / 2)
     return bool(within.mean() > _SOFT)
 
 
