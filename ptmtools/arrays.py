@@ -1,6 +1,6 @@
 """Short names of array types by their elements.
 
-Products of vectors, and the triangles and tetrahedra that they span."""
+Products of vectors, and the triangles and tetrahedra that they span; gaps of images."""
 
 from __future__ import annotations
 
@@ -92,3 +92,25 @@ def fans(start: Ints) -> tuple[Ints, Ints]:
 def ranges(first: Ints, count: Ints) -> Ints:
     """(m,) of each of the (n,) rows ``first``, and as many after it as to make ``count``."""
     return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))
+
+
+def fill_gaps(value: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
+    """(h, w, k) values, those of (h, w) weight 0 from nearby ones, by a pyramid of weighted means;
+    1 if all weights are 0."""
+    if weight.all() or not weight.any():
+        return value if weight.all() else np.ones_like(value)
+    total = _sums(weight.astype(np.float32))
+    mean = np.empty((*total.shape, value.shape[2]), value.dtype)
+    for k in range(value.shape[2]):
+        sums = _sums(np.multiply(value[..., k], weight, dtype=np.float32))
+        np.divide(sums, total, out=sums, where=total > 0)
+        mean[..., k] = sums if value.dtype.kind == "f" else np.rint(sums)
+    coarse = fill_gaps(mean, total).repeat(2, axis=0).repeat(2, axis=1)
+    height, width = weight.shape
+    return np.asarray(np.where(weight[..., None] > 0, value, coarse[:height, :width]))
+
+
+def _sums(values: Singles) -> Singles:
+    """Of 2 × 2 values, in one order on all machines; a last odd row or column has no others."""
+    even = np.pad(values, [(0, side % 2) for side in values.shape])
+    return (even[::2, ::2] + even[::2, 1::2]) + (even[1::2, ::2] + even[1::2, 1::2])

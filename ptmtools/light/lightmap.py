@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, plane_areas
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, fill_gaps, plane_areas
 from ptmtools.jit import kernel
 from ptmtools.light.atlas import Atlas, claim, coordinates, cover, nearest
 from ptmtools.light.looks import SMALLEST, Look
@@ -150,7 +150,7 @@ class TexelGrid:
         known[self.row[sound], self.column[sound]] = True
         for _ in range(_GROWN):
             value, known = grow(value, known, self.chart)
-        return fill(value, known)
+        return fill_gaps(value, known)
 
 
 @kernel
@@ -258,25 +258,6 @@ def grow(value: Singles, known: Bools, chart: NDArray[np.int32]) -> tuple[Single
                 for k in range(channels):
                     result[row, column, k] /= count
     return result, grown
-
-
-def fill(value: Singles, known: Bools) -> Singles:
-    """(h, w, k) the known values, and nearby ones in the other texels, by a pyramid of means; 1 if
-    none is known."""
-    if known.all() or not known.any():
-        return np.asarray(np.where(known[..., None], value, 1), np.float32)
-    height, width, channels = value.shape
-    # Even sides: a last row or column counts twice.
-    grown = [(0, height % 2), (0, width % 2)]
-    weight = np.pad(known, grown).astype(np.float32)
-    total = np.pad(np.where(known[..., None], value, 0), [*grown, (0, 0)]).astype(np.float32)
-    count = weight.reshape(weight.shape[0] // 2, 2, -1, 2).sum(axis=(1, 3))
-    total = total.reshape(len(total) // 2, 2, -1, 2, channels).sum(axis=(1, 3))
-    some = count[..., None]
-    mean = np.divide(total, some, out=np.zeros_like(total), where=some > 0)
-    coarse = fill(mean, count > 0)
-    fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-    return np.asarray(np.where(known[..., None], value, fine), np.float32)
 
 
 #: Number of points of a face at which its light is computed.

@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Singles, normals, sum_by_group
+from ptmtools.arrays import Floats, Singles, fill_gaps, normals, sum_by_group
 from ptmtools.light.atlas import Atlas, claim, cover, nearest as nearest_on, unwrap
-from ptmtools.light.lightmap import fill
 from ptmtools.output.object_maps import frame_axes
 from ptmtools_systems.apo.making import Simple
 from ptmtools_systems.apo.model import ApoOptions
@@ -154,7 +153,7 @@ class Baking:
         inside[:, 2] = np.maximum(inside[:, 2], _LEAST_ALONG)
         value = np.zeros((side, side, 3), np.float32)
         value[row, column] = _units(inside, 2)
-        full = fill(value, owner >= 0)
+        full = fill_gaps(value, owner >= 0)
         return _encode(_units(full, 2)), 1 - float(met.mean())
 
     def comparison(self, count: float) -> Compared:

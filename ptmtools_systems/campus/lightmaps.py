@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles, fill_gaps
 from ptmtools.jit import kernel
 from ptmtools.light.atlas import Atlas
-from ptmtools.light.lightmap import TexelGrid, fill
+from ptmtools.light.lightmap import TexelGrid
 from ptmtools.light.looks import Look
 
 #: Largest difference between four texels that agree.
@@ -65,7 +65,7 @@ def bake(
         value[row, column] = smooth(value, grid.chart, row, column, np.float32(grain))
         below = value, grid.chart, grid.centred
         if size > sizes[0]:
-            filled = fill(value[..., None], grid.chart >= 0)[..., 0]
+            filled = fill_gaps(value[..., None], grid.chart >= 0)[..., 0]
             result.append(SizedMap(filled, len(row), len(grid.face)))
     return result
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, fill_gaps
 from ptmtools.light.atlas import unwrap
-from ptmtools.light.lightmap import TexelGrid, fill, vertex_light
+from ptmtools.light.lightmap import TexelGrid, vertex_light
 from ptmtools.light.looks import LightImage, PaintedLight
 from ptmtools.light.occlusion import normals
 from ptmtools.pipeline.encoding import lossy_codes
@@ -73,7 +73,7 @@ def test_gaps_take_what_is_near(seed: int, height: int, width: int) -> None:
     random = np.random.default_rng(seed)
     value = random.random((height, width, 2)).astype(np.float32)
     known = random.random((height, width)) < 0.2
-    actual = fill(value, known)
+    actual = fill_gaps(value, known)
     assert np.array_equal(actual[known], value[known])
     if known.any():
         assert actual.min() >= value[known].min() - 1e-6
@@ -87,7 +87,7 @@ def test_a_gap_has_the_value_of_its_own_side() -> None:
     known = np.zeros((32, 32), bool)
     known[:, :12] = known[:, 20:] = True
     value[:, 20:] = 1
-    actual = fill(value, known)
+    actual = fill_gaps(value, known)
     assert (actual[:, 12:14] == 0).all()
     assert (actual[:, 18:20] == 1).all()
 
