@@ -40,7 +40,6 @@ from ptmtools.cells.structure import (
     WallPlane,
     find_walls,
     spread_over,
-    without_facets,
 )
 from ptmtools.cells.ways import floors_with_ways
 from ptmtools.executor import Executor
@@ -157,12 +156,12 @@ class Building:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
         fabric = Fabric.from_scene(scene, options)
         doors, structure = Doors.recognise(fabric, Structure.from_fabric(fabric, tolerance))
-        every = flat = walls = find_walls(structure, options.wall_area)
+        forced = bool(options.structural)
+        walls, facets = find_walls(structure, options.wall_area, facets=forced)
         hangings = 0
-        if not options.structural:
-            flat = without_facets(every)
+        if not forced:
             sizes = options.wall_area, options.wall_thickness
-            walls, hangings = without_hangings(flat, structure, *sizes)
+            walls, hangings = without_hangings(walls, structure, *sizes)
         walker = Walker(*options.walker)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
         floors = Floors.from_fabric(fabric, GRAIN * walker.radius)
@@ -189,7 +188,7 @@ class Building:
             cameras=np.array([camera.position for camera in scene.cameras]).reshape(-1, 3),
             furniture=tuple(scene.objects[i] for i in owners[np.argsort(-size, kind="stable")]),
             shaped=len(shaped),
-            facets=len(every) - len(flat),
+            facets=facets,
             hangings=hangings,
         )
 

@@ -130,29 +130,57 @@ def structural_triangles(
     return result
 
 
-def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
-    """The planes that may split leaves, heaviest first."""
-    tolerance, forced = structure.tolerance, structure.forced
+def find_walls(
+    structure: Structure, wall_area: float, facets: bool = True
+) -> tuple[list[WallPlane], int]:
+    """The planes that may split leaves, heaviest first. Without ``facets``, those of a scanned
+    surface are left out, which would divide space by the thousand and enclose nothing: if most of
+    very many walls, by area, are neither upright nor level. And the number of these."""
     least = (1 - TIE_SHARE) * wall_area
-    walls_by_area: list[tuple[float, WallPlane]] = []
-    for plane in _layers(structure, least):
-        frame = PlaneFrame.from_plane(plane)
-        flat = structure.find_in(plane)
-        if not _may_hold_wall(structure, frame, flat, least):
-            continue
-        blocking = structure.unite(frame, flat)
-        shapely.prepare(blocking)
-        masonry = flat[~structure.door[flat]]
-        alone = len(masonry) < len(flat)
-        parts = shapely.get_parts(structure.unite(frame, masonry) if alone else blocking)
-        group = neighbours(parts, tolerance.hairline)
-        large = np.bincount(group, weights=shapely.area(parts))[group] >= least
-        if np.any(forced[flat]):
-            large |= shapely.intersects(parts, structure.unite(frame, flat[forced[flat]]))
-        if np.any(large):
-            walls = shapely.multipolygons(parts[large])
-            walls_by_area.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
-    return [walls_by_area[i][1] for i in rank(np.array([area for area, _ in walls_by_area]))]
+    seeds = _layers(structure, least)
+    planes, size = structure.planes[seeds], structure.areas[seeds]
+    rise = np.abs(planes[:, 1])
+    leans = (rise >= _STRAIGHT) & (rise <= np.sqrt(1 - _STRAIGHT**2))
+    walls, area = np.full(len(seeds), None, dtype=object), np.zeros(len(seeds))
+    for i in np.flatnonzero(~leans):
+        walls[i], area[i] = _wall_in(structure, planes[i], least)
+    # A triangle as large as a wall is one, whatever else is in its plane: so are most of a scan.
+    sure = np.where(leans & (size >= wall_area), size, area)
+    scanned = not facets and _is_scan(sure, leans)
+    if not scanned:
+        for i in np.flatnonzero(leans):
+            walls[i], area[i] = _wall_in(structure, planes[i], least)
+        sure = area
+        scanned = not facets and _is_scan(area, leans)
+    kept = np.flatnonzero((sure > 0) & ~(scanned & leans))
+    return walls[kept][rank(area[kept])].tolist(), np.count_nonzero(sure) - len(kept)
+
+
+def _is_scan(area: Floats, leans: Bools) -> bool:
+    """Whether walls of (n,) areas, m², 0 for none, are very many, and most of them by area lean."""
+    return np.count_nonzero(area) >= _MANY and bool(2 * area[leans].sum() > area.sum())
+
+
+def _wall_in(structure: Structure, plane: Floats, least: float) -> tuple[WallPlane | None, float]:
+    """The walls in a plane, of connected polygons of an area, m², or more, and their area."""
+    tolerance, forced = structure.tolerance, structure.forced
+    frame = PlaneFrame.from_plane(plane)
+    flat = structure.find_in(plane)
+    if not _may_hold_wall(structure, frame, flat, least):
+        return None, 0.0
+    blocking = structure.unite(frame, flat)
+    shapely.prepare(blocking)
+    masonry = flat[~structure.door[flat]]
+    alone = len(masonry) < len(flat)
+    parts = shapely.get_parts(structure.unite(frame, masonry) if alone else blocking)
+    group = neighbours(parts, tolerance.hairline)
+    large = np.bincount(group, weights=shapely.area(parts))[group] >= least
+    if np.any(forced[flat]):
+        large |= shapely.intersects(parts, structure.unite(frame, flat[forced[flat]]))
+    if not np.any(large):
+        return None, 0.0
+    walls = shapely.multipolygons(parts[large])
+    return WallPlane(frame, walls, blocking), float(shapely.area(walls))
 
 
 def _may_hold_wall(structure: Structure, frame: PlaneFrame, flat: Ints, least: float) -> bool:
@@ -167,19 +195,8 @@ def _may_hold_wall(structure: Structure, frame: PlaneFrame, flat: Ints, least: f
     return bool((sum_by_group(group, structure.areas[flat], len(flat)) >= least).any())
 
 
-def without_facets(walls: list[WallPlane]) -> list[WallPlane]:
-    """The walls without the facets of a scanned surface, which would divide space by the thousand
-    and enclose nothing: if most of very many walls, by area, are neither upright nor level."""
-    rise = np.abs([wall.frame.plane[1] for wall in walls])
-    straight = (rise < _STRAIGHT) | (rise > np.sqrt(1 - _STRAIGHT**2))
-    area = np.array([float(shapely.area(wall.walls)) for wall in walls])
-    if len(walls) < _MANY or area[straight].sum() >= area.sum() / 2:
-        return walls
-    return [wall for wall, keeps in zip(walls, straight, strict=True) if keeps]
-
-
-def _layers(structure: Structure, wall_area: float) -> list[Floats]:
-    """Planes that hold enough coplanar area to carry a wall, heaviest first.
+def _layers(structure: Structure, wall_area: float) -> Ints:
+    """Triangles in whose planes enough coplanar area lies to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
     as its free area falls below ``wall_area``, or too many planes were tried without success: so
@@ -192,7 +209,7 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     waiting = bins.weights(weights)
     start, members_of = bins.members()
     free = (areas > 0) & ~structure.door
-    layers: list[tuple[float, Floats]] = []
+    layers: list[tuple[float, int]] = []
     promising = free & (waiting[bins.own] >= wall_area)
     tries = Tries(bins.own, areas)
     for seed in rank(np.where(promising, areas, 0.0))[: np.count_nonzero(promising)]:
@@ -210,10 +227,11 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
         bins.drop(waiting, members, weights[members])
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
-            layers.append((weight, planes[seed]))
+            layers.append((weight, int(seed)))
         else:
             tries.fail(seed, near[free[near]], wall_area)
-    return [layers[i][1] for i in rank(np.array([weight for weight, _ in layers]))]
+    order = rank(np.array([weight for weight, _ in layers]))
+    return np.array([seed for _, seed in layers], dtype=np.int64)[order]
 
 
 #: Number of triangles in a plane from which all of them count as one cluster.

@@ -172,7 +172,7 @@ def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
     monkeypatch.setattr(
         Structure, "lie_in", lambda *arguments: tried.append(1) or lie_in(*arguments)
     )
-    walls = find_walls(
+    walls, _ = find_walls(
         Structure.from_fabric(Fabric.from_scene(scene, SubdivideOptions()), scene.tolerance), 2.0
     )
     assert len(tried) < len(scene.triangles) / 2
