@@ -14,6 +14,7 @@ small cost that hides nothing.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -223,9 +224,13 @@ def shadows(
     every, which = np.concatenate(points, axis=1), np.concatenate(valid, axis=1)
     row, _ = np.nonzero(which)
     order = np.argsort(owner[row], kind="stable")
-    names, group = np.unique(owner[row][order], return_inverse=True)
-    clouds = shapely.multipoints(every[which][order], indices=group.reshape(-1))
-    return names, np.asarray(shapely.convex_hull(clouds))
+    names, first, size = np.unique(owner[row][order], return_index=True, return_counts=True)
+    # Hulls of lines, at least from a point to itself: sets of points take twice as long to make.
+    times = np.ones(len(order), dtype=np.int64)
+    times[first] = 2
+    group = np.repeat(np.arange(len(names)), size + 1)
+    lines = shapely.linestrings(np.repeat(every[which][order], times, axis=0), indices=group)
+    return names, np.asarray(shapely.convex_hull(lines))
 
 
 def cut_tiles(shapes: Geometry, margin: float, grid: float) -> tuple[Geometry, Geometry, Ints]:
@@ -464,8 +469,13 @@ def meets(
     leaf, floor = leaf[near], floor[near]
     edges = [body.points[body.edges] for body in bodies]
     number = np.array([len(segments) for segments in edges], dtype=np.int64)
-    for first in range(0, len(leaf), _AT_ONCE):
-        some = np.arange(first, min(first + _AT_ONCE, len(leaf)))
+    # By turns, one floor of each leaf, then more: most leaves meet the first.
+    turn = np.frexp(np.arange(len(leaf)) - np.searchsorted(leaf, leaf))[1]
+    order = np.argsort(turn, kind="stable")
+    leaf, floor = leaf[order], floor[order]
+    begins = np.union1d(np.arange(0, len(leaf), _AT_ONCE), np.cumsum(np.bincount(turn)))
+    for first, end in itertools.pairwise(begins.tolist()):
+        some = np.arange(first, end)
         some = some[~result[leaf[some]]]
         if not len(some):
             continue
