@@ -1,5 +1,6 @@
 """Compiled loops: growth of flat regions over a mesh (`fabric`), connected indices (`search`),
-descent of whole triangles through a BSP tree (`ownership`), points above floors (`model`).
+descent of whole triangles through a BSP tree (`ownership`), points above floors (`model`), shadows
+near regions of floor (`places`).
 """
 
 from __future__ import annotations
@@ -172,3 +173,72 @@ def above_floor(
                 if whole != 0:
                     over = p[1] - (u * a[1] + v * b[1] + w * c[1]) / whole
                     inside[i] = 0 <= over <= reach
+
+
+@plain_kernel
+def shadows_near(
+    corner: Floats,
+    slope: Floats,
+    row: Ints,
+    point: Floats,
+    start: Ints,
+    low: float,
+    high: float,
+    reach: float,
+    shadow: Floats,
+    near: Bools,
+) -> None:
+    """Clears ``near`` where no axis square to a side leaves the shadow of a triangle within reach
+    of a region of floor.
+
+    Parameters
+    ----------
+    corner: (n, 3, 3) triangles.
+    slope, row: (n, 3) heights a·x + b·z + c above which the shadows are cast, and (n,) regions.
+    point, start: (m, 2) corners in plan of the regions' hulls, counter-clockwise, closed, and their
+        CSR.
+    low, high: the band of heights whose shadows count, metres.
+    reach: metres in plan.
+    shadow: (9, 2) storage.
+    near: (n,) set.
+    """
+    for i in range(len(row)):
+        a, b, c = slope[i, 0], slope[i, 1], slope[i, 2]
+        first, end = start[row[i]], start[row[i] + 1] - 1
+        count = 0
+        for k in range(3):
+            p, q = corner[i, k], corner[i, (k + 1) % 3]
+            above = p[1] - (p[0] * a + p[2] * b) - c
+            beyond = q[1] - (q[0] * a + q[2] * b) - c
+            if low <= above <= high:
+                shadow[count, 0], shadow[count, 1] = p[0], p[2]
+                count += 1
+            for level in (low, high):
+                if (above - level) * (beyond - level) < 0:
+                    share = (level - above) / (beyond - above)
+                    shadow[count, 0] = p[0] + share * (q[0] - p[0])
+                    shadow[count, 1] = p[2] + share * (q[2] - p[2])
+                    count += 1
+        apart = count == 0
+        for k in range(first, end):
+            x, z = point[k + 1, 1] - point[k, 1], point[k, 0] - point[k + 1, 0]
+            limit = x * point[k, 0] + z * point[k, 1] + reach * (x * x + z * z) ** 0.5
+            beside = True
+            for s in range(count):
+                beside &= x * shadow[s, 0] + z * shadow[s, 1] > limit
+            apart |= beside
+        for k in range(3):
+            p, q = corner[i, k], corner[i, (k + 1) % 3]
+            x, z = q[2] - p[2], p[0] - q[0]
+            least, most = np.inf, -np.inf
+            for s in range(count):
+                away = x * shadow[s, 0] + z * shadow[s, 1]
+                least, most = min(least, away), max(most, away)
+            margin = reach * (x * x + z * z) ** 0.5
+            before = after = True
+            for s in range(first, end):
+                away = x * point[s, 0] + z * point[s, 1]
+                before &= away < least - margin
+                after &= away > most + margin
+            apart |= before | after
+        near[i] = not apart

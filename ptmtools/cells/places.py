@@ -144,6 +144,8 @@ def _subtract_near(
     order = np.lexsort((-across * along, row))
     row, corners = row[order], corners[order]
     turn = np.arange(len(row)) - np.searchsorted(row, row)
+    some = _shadows_near(plan, slope, corners, row, band, radius + tolerance.rounding)
+    row, corners, turn = row[some], corners[some], turn[some]
     rest = plan.copy()
     first, end = 0, 1
     while (turn >= first).any():
@@ -159,6 +161,27 @@ def _subtract_near(
         rest[names] = difference(rest[names], taken, tolerance.grid)
         first, end = end, int(_GROWTH * end) + 1
     return rest
+
+
+def _shadows_near(
+    plan: Geometry,
+    slope: Floats,
+    corners: Floats,
+    row: Ints,
+    band: tuple[float, float],
+    reach: float,
+) -> Bools:
+    """(n,) whether the `shadows` of triangles, (n, 3, 3), may be within reach of the regions of
+    their rows: those of neighbours in a scan are not, but their boxes."""
+    from ptmtools.cells.kernels import shadows_near
+
+    hull = shapely.orient_polygons(shapely.convex_hull(plan))
+    point, owner = shapely.get_coordinates(hull, return_index=True)
+    start = np.searchsorted(owner, np.arange(len(plan) + 1))
+    near = np.ones(len(row), dtype=np.bool_)
+    shadow = np.empty((9, 2))
+    shadows_near(corners, slope[row], row, point, start, *band, reach, shadow, near)
+    return near
 
 
 def _merge(
