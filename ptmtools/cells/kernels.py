@@ -178,67 +178,99 @@ def above_floor(
 @plain_kernel
 def shadows_near(
     corner: Floats,
-    slope: Floats,
-    row: Ints,
+    farthest: Floats,
     point: Floats,
     start: Ints,
-    low: float,
-    high: float,
+    slope: Floats,
+    band: tuple[float, float],
     reach: float,
     shadow: Floats,
-    near: Bools,
-) -> None:
-    """Clears ``near`` where no axis square to a side leaves the shadow of a triangle within reach
-    of a region of floor.
+    pairs: Ints,
+) -> int:
+    """The number of pairs of a region of floor and a triangle whose shadow, the part in a band of
+    heights above the region in plan, is within reach of its hull: no axis square to a side of one
+    of them separates them by more. As many as fit are written to ``pairs``, by regions.
 
     Parameters
     ----------
-    corner: (n, 3, 3) triangles.
-    slope, row: (n, 3) heights a·x + b·z + c above which the shadows are cast, and (n,) regions.
-    point, start: (m, 2) corners in plan of the regions' hulls, counter-clockwise, closed, and their
-        CSR.
-    low, high: the band of heights whose shadows count, metres.
-    reach: metres in plan.
+    corner: (n, 3, 3) triangles by their least x.
+    farthest: (n,) the greatest x of each and those before it.
+    point, start: (m, 2) corners in plan of the hulls, counter-clockwise, closed, and their CSR.
+    slope: (r, 3) of regions whose heights are a·x + b·z + c.
+    band, reach: metres.
     shadow: (9, 2) storage.
-    near: (n,) set.
+    pairs: (2, p) receives regions and triangles.
     """
-    for i in range(len(row)):
-        a, b, c = slope[i, 0], slope[i, 1], slope[i, 2]
-        first, end = start[row[i]], start[row[i] + 1] - 1
-        count = 0
-        for k in range(3):
-            p, q = corner[i, k], corner[i, (k + 1) % 3]
-            above = p[1] - (p[0] * a + p[2] * b) - c
-            beyond = q[1] - (q[0] * a + q[2] * b) - c
-            if low <= above <= high:
-                shadow[count, 0], shadow[count, 1] = p[0], p[2]
+    number = 0
+    for r in range(len(slope)):
+        hull = point[start[r] : start[r + 1]]
+        x0 = z0 = np.inf
+        x1 = z1 = -np.inf
+        for k in range(len(hull)):
+            x0, x1 = min(x0, hull[k, 0] - reach), max(x1, hull[k, 0] + reach)
+            z0, z1 = min(z0, hull[k, 1] - reach), max(z1, hull[k, 1] + reach)
+        for i in range(np.searchsorted(farthest, x0), len(corner)):
+            a, b, c = corner[i, 0], corner[i, 1], corner[i, 2]
+            if min(a[0], b[0], c[0]) > x1:
+                break
+            if max(a[0], b[0], c[0]) < x0:
+                continue
+            if max(a[2], b[2], c[2]) < z0 or min(a[2], b[2], c[2]) > z1:
+                continue
+            count = cast_shadow(corner[i], slope[r], band, shadow)
+            if count and not sides_separate(corner[i], shadow[:count], hull, reach):
+                if number < pairs.shape[1]:
+                    pairs[0, number], pairs[1, number] = r, i
+                number += 1
+    return number
+
+
+@plain_kernel
+def cast_shadow(corner: Floats, slope: Floats, band: tuple[float, float], shadow: Floats) -> int:
+    """The number of points written to ``shadow``, (9, 2), whose hull is the shadow of a triangle,
+    (3, 3); see `shadows_near`."""
+    count = 0
+    for k in range(3):
+        p, q = corner[k], corner[(k + 1) % 3]
+        above = p[1] - (p[0] * slope[0] + p[2] * slope[1]) - slope[2]
+        beyond = q[1] - (q[0] * slope[0] + q[2] * slope[1]) - slope[2]
+        if band[0] <= above <= band[1]:
+            shadow[count, 0], shadow[count, 1] = p[0], p[2]
+            count += 1
+        for level in band:
+            if (above - level) * (beyond - level) < 0:
+                share = (level - above) / (beyond - above)
+                shadow[count, 0] = p[0] + share * (q[0] - p[0])
+                shadow[count, 1] = p[2] + share * (q[2] - p[2])
                 count += 1
-            for level in (low, high):
-                if (above - level) * (beyond - level) < 0:
-                    share = (level - above) / (beyond - above)
-                    shadow[count, 0] = p[0] + share * (q[0] - p[0])
-                    shadow[count, 1] = p[2] + share * (q[2] - p[2])
-                    count += 1
-        apart = count == 0
-        for k in range(first, end):
-            x, z = point[k + 1, 1] - point[k, 1], point[k, 0] - point[k + 1, 0]
-            limit = x * point[k, 0] + z * point[k, 1] + reach * (x * x + z * z) ** 0.5
-            beside = True
-            for s in range(count):
-                beside &= x * shadow[s, 0] + z * shadow[s, 1] > limit
-            apart |= beside
-        for k in range(3):
-            p, q = corner[i, k], corner[i, (k + 1) % 3]
-            x, z = q[2] - p[2], p[0] - q[0]
-            least, most = np.inf, -np.inf
-            for s in range(count):
-                away = x * shadow[s, 0] + z * shadow[s, 1]
-                least, most = min(least, away), max(most, away)
-            margin = reach * (x * x + z * z) ** 0.5
-            before = after = True
-            for s in range(first, end):
-                away = x * point[s, 0] + z * point[s, 1]
-                before &= away < least - margin
-                after &= away > most + margin
-            apart |= before | after
-        near[i] = not apart
+    return count
+
+
+@plain_kernel
+def sides_separate(corner: Floats, shadow: Floats, hull: Floats, reach: float) -> bool:
+    """Whether a side of a hull, or of a triangle, (3, 3), in plan, separates a shadow from the hull
+    by more than ``reach``; see `shadows_near`."""
+    for k in range(len(hull) - 1):
+        x, z = hull[k + 1, 1] - hull[k, 1], hull[k, 0] - hull[k + 1, 0]
+        limit = x * hull[k, 0] + z * hull[k, 1] + reach * (x * x + z * z) ** 0.5
+        beside = True
+        for s in range(len(shadow)):
+            beside &= x * shadow[s, 0] + z * shadow[s, 1] > limit
+        if beside:
+            return True
+    for k in range(3):
+        p, q = corner[k], corner[(k + 1) % 3]
+        x, z = q[2] - p[2], p[0] - q[0]
+        margin = reach * (x * x + z * z) ** 0.5
+        least, most = np.inf, -np.inf
+        for s in range(len(shadow)):
+            away = x * shadow[s, 0] + z * shadow[s, 1]
+            least, most = min(least, away - margin), max(most, away + margin)
+        before = after = True
+        for s in range(len(hull)):
+            away = x * hull[s, 0] + z * hull[s, 1]
+            before &= away < least
+            after &= away > most
+        if before or after:
+            return True
+    return False

@@ -4,9 +4,10 @@ A **place** is a point of a surface within 45° of level over which an upright c
 a walker from the height of a step to that of the head, meets nothing structural; in doubt the body
 fits. For each flat region of floor, the part of the structure in a band of heights above it is
 projected onto it along the vertical, widened by the radius and subtracted (`clear_of`). Circles are
-polygons inside them. Floors are searched in blocks of neighbours, floors and triangles are sorted
-by storeys, and regions with many triangles about them are cut in two, so the time is proportional
-to the triangles near floors.
+polygons inside them. Floors are searched in blocks of neighbours, a compiled loop (`shadows_near`)
+discards triangles whose shadows are beside a floor, such as its neighbours in a scan, and regions
+with many triangles about them are cut in two, so the time is proportional to the triangles near
+floors.
 
 Leaves that meet the eye region are standing. Ceilings lower than the eyes may be are ignored: a
 small cost that hides nothing.
@@ -38,17 +39,17 @@ from ptmtools.cells.planar import (
     unite_rows,
 )
 from ptmtools.cells.planes import PLAN, Polyhedron, boxes_meet
-from ptmtools.cells.search import ByHeight, along_a_curve
+from ptmtools.cells.search import along_a_curve
 from ptmtools.cells.structure import points_in
 from ptmtools.executor import Executor
 from ptmtools.tolerance import TOUCH_SHARE, Tolerance
 
-#: Floors within this height, as a share of the band, are compared together.
-_STOREY = 0.2
 #: A shape of less area for its length than this share of a radius is a line.
 _THIN = 4e-3
 #: A region is compared with one of the triangles about it, then with this many times more.
 _GROWTH = 1.25
+#: Number of pairs of a region and a triangle for which there is space at first, for each region.
+_PAIRS = 16
 #: Regions with more triangles about them, and shapes of more corners, are cut in two,
 _CROWD, CORNERS = 256, 256
 #: unless they are no longer than this many times the height of the band, or the margin.
@@ -71,11 +72,9 @@ def clear_of(
     The regions are (r,) polygons in ``plan``, whose heights are a·x + b·z + c by (r, 3) ``slope``.
     """
     pieces, owner, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
-    by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
-    flat = corners[:, :, PLAN]
-    boxes = shapely.box(*flat.min(axis=1).T, *flat.max(axis=1).T)
+    corners = corners[np.argsort(corners[:, :, 0].min(axis=1), kind="stable")]
     while len(region):
-        row, near = _pairs_near(corners, boxes, by_height, plan, slope, band, radius)
+        row, near = _pairs_near(corners, plan, slope, band, radius + tolerance.rounding)
         crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
             longest(plan) > _SHORT * band[1]
         )
@@ -90,36 +89,21 @@ def clear_of(
 
 
 def _pairs_near(
-    corners: Floats,
-    boxes: Geometry,
-    by_height: ByHeight,
-    plan: Geometry,
-    slope: Floats,
-    band: tuple[float, float],
-    radius: float,
+    corners: Floats, plan: Geometry, slope: Floats, band: tuple[float, float], reach: float
 ) -> tuple[Ints, Ints]:
-    """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
-    ``band``, whose boxes in plan, those of the latter in ``boxes``, are no more than a radius
-    apart."""
-    least, greatest = heights(plan, slope)
-    margin = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
-    least, greatest = least - margin, greatest + margin
-    storey = np.floor(least / (_STOREY * (band[1] - band[0])))
-    rows, hits = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
-    reach = shapely.box(x0 - radius, z0 - radius, x1 + radius, z1 + radius)
-    # Storey by storey, so that a floor is compared only with triangles of its height.
-    for name in np.unique(storey):
-        on_storey = np.flatnonzero(storey == name)
-        bottom, top = least[on_storey].min() + band[0], greatest[on_storey].max() + band[1]
-        about = by_height.find_between(bottom, top)
-        row, near = shapely.STRtree(boxes[about]).query(reach[on_storey])
-        row, near = on_storey[row], about[near]
-        height = heights_above(corners[near], slope[row])
-        meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
-        rows.append(row[meets])
-        hits.append(near[meets])
-    return np.concatenate(rows), np.concatenate(hits)
+    """(p,) and (p,): pairs of a region of floor, ascending, and a triangle, (n, 3, 3), by the least
+    x, among which are all whose shadow (`shadows`) is within reach of the region."""
+    from ptmtools.cells.kernels import shadows_near
+
+    farthest = np.maximum.accumulate(corners[:, :, 0].max(axis=1))
+    hull = shapely.orient_polygons(shapely.convex_hull(plan))
+    point, owner = shapely.get_coordinates(hull, return_index=True)
+    start = np.searchsorted(owner, np.arange(len(plan) + 1))
+    count, pairs, shadow = 1, np.empty((2, 0), dtype=np.int64), np.empty((9, 2))
+    while count > pairs.shape[1]:
+        pairs = np.empty((2, max(count, _PAIRS * len(plan))), dtype=np.int64)
+        count = shadows_near(corners, farthest, point, start, slope, band, reach, shadow, pairs)
+    return pairs[0, :count], pairs[1, :count]
 
 
 def _subtract_near(
@@ -144,8 +128,6 @@ def _subtract_near(
     order = np.lexsort((-across * along, row))
     row, corners = row[order], corners[order]
     turn = np.arange(len(row)) - np.searchsorted(row, row)
-    some = _shadows_near(plan, slope, corners, row, band, radius + tolerance.rounding)
-    row, corners, turn = row[some], corners[some], turn[some]
     rest = plan.copy()
     first, end = 0, 1
     while (turn >= first).any():
@@ -161,27 +143,6 @@ def _subtract_near(
         rest[names] = difference(rest[names], taken, tolerance.grid)
         first, end = end, int(_GROWTH * end) + 1
     return rest
-
-
-def _shadows_near(
-    plan: Geometry,
-    slope: Floats,
-    corners: Floats,
-    row: Ints,
-    band: tuple[float, float],
-    reach: float,
-) -> Bools:
-    """(n,) whether the `shadows` of triangles, (n, 3, 3), may be within reach of the regions of
-    their rows: those of neighbours in a scan are not, but their boxes."""
-    from ptmtools.cells.kernels import shadows_near
-
-    hull = shapely.orient_polygons(shapely.convex_hull(plan))
-    point, owner = shapely.get_coordinates(hull, return_index=True)
-    start = np.searchsorted(owner, np.arange(len(plan) + 1))
-    near = np.ones(len(row), dtype=np.bool_)
-    shadow = np.empty((9, 2))
-    shadows_near(corners, slope[row], row, point, start, *band, reach, shadow, near)
-    return near
 
 
 def _merge(
@@ -336,9 +297,9 @@ class Places:
             # Of many corners, or none that GEOS can divide: cut in two, and tried again.
             large = shapely.get_num_coordinates(parts) > CORNERS
             triangles = delaunay(np.where(large, shapely.Polygon(), parts))
-            pieces, part = shapely.get_parts(triangles, return_index=True)
-            corners.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
-            owner.append(region[part])
+            point, part = shapely.get_coordinates(triangles, return_index=True)
+            corners.append(point.reshape(-1, 4, 2)[:, :3])
+            owner.append(region[part[::4]])
             undivided = shapely.is_empty(triangles)
             parts, which = halves(parts[undivided], tolerance.grid)
             region = region[undivided][which]

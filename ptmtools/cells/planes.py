@@ -22,6 +22,8 @@ from ptmtools.tolerance import Tolerance
 UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 #: Seen from above.
 PLAN = [0, 2]
+#: Up to this many boxes are compared one by one.
+_FEW = 32
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,9 @@ def bounds(corners: Floats) -> tuple[Floats, Floats]:
 
 def boxes_meet(low: Floats, high: Floats, boxes: Floats) -> Bools:
     """(n,) which of the boxes between (n, 3) corners meet one of (m, 2, 3) boxes."""
+    if len(boxes) <= _FEW:
+        met = ((low <= box[1]) & (high >= box[0]) for box in boxes)
+        return np.any([np.zeros(len(low), np.bool_), *(axes.all(axis=1) for axes in met)], axis=0)
     x0, z0 = low[:, PLAN].T
     x1, z1 = high[:, PLAN].T
     (u0, bottom, w0), (u1, top, w1) = boxes.transpose(1, 2, 0)

@@ -64,7 +64,7 @@ def floors_with_ways(
     if count < 2 or not len(corners):
         return every
     size = sum_by_group(region, areas(corners), count)
-    region, middle, weight = _look_points(corners, region)
+    region, middle, weight = _look_points(corners, region, walker.radius**2)
     middle[:, 1] += walker.middle
     named = np.zeros(count, dtype=np.bool_)
     for room in rooms:
@@ -86,12 +86,14 @@ def floors_with_ways(
     return kept
 
 
-def _look_points(corners: Floats, region: Ints) -> tuple[Ints, Floats, Floats]:
-    """(n,) regions, (n, 3) the middles of the largest of their triangles, (n,) m² of these."""
+def _look_points(corners: Floats, region: Ints, body: float) -> tuple[Ints, Floats, Floats]:
+    """(n,) regions, (n, 3) the middles of the largest of their triangles, (n,) m² of these; one for
+    every ``body``, m², or part of it, in a region: all points of a patch of a scan see the same."""
     size = areas(corners)
     order = np.lexsort((-size, region))
     turn = np.arange(len(order)) - np.searchsorted(region[order], region[order])
-    some = order[turn < _LOOKS]
+    bodies = np.ceil(np.bincount(region, size) / body)
+    some = order[turn < np.clip(bodies, 1, _LOOKS)[region[order]]]
     return region[some], corners[some].mean(axis=1), size[some]
 
 
@@ -164,16 +166,20 @@ def _near_pairs(places: Places, walker: Walker, distance: float, group: Ints) ->
     least, greatest = heights(plan, slope)
     box = shapely.bounds(plan) + np.array([-distance, -distance, distance, distance]) / 2
     box = shapely.box(*box.T)
-    first, second = shapely.STRtree(box).query(box)
+    # One of two groups is not the largest, to which most regions of a scan belong.
+    largest = group == np.bincount(group, minlength=1).argmax()
+    others = np.flatnonzero(~largest)
+    first, second = shapely.STRtree(box).query(box[others])
+    first = others[first]
     rise = walker.step + _STRIDE * walker.scale  # of slopes up to 45°
-    near = (first < second) & (group[first] != group[second])
+    near = ((first < second) | largest[second]) & (group[first] != group[second])
     near &= least[first] <= greatest[second] + rise
     near &= least[second] <= greatest[first] + rise
     first, second = first[near], second[near]
     near = np.any(slope[first, :2] != slope[second, :2], axis=1)
     near |= np.abs(least[first] - least[second]) <= walker.step
     near[near] = shapely.dwithin(plan[first[near]], plan[second[near]], distance)
-    pairs = np.stack([first[near], second[near]], axis=1)
+    pairs = np.sort(np.stack([first[near], second[near]], axis=1), axis=1)
     size = shapely.get_num_coordinates(plan)[pairs]
     return np.take_along_axis(pairs, size.argsort(axis=1, kind="stable"), axis=1)
 

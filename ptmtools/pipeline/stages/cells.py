@@ -19,7 +19,7 @@ class CellsStage(Stage["Cells"]):
 
     name = "cells"
     about = "Read a model and divide its space into cells and portals."
-    recipe = 11
+    recipe = 12
     changed = (
         "division ends where it saves visitors little (--gain); cells are walkable space, or "
         "space visible from it"
