@@ -136,3 +136,26 @@ def test_slivers_as_wide_as_rounding_have_no_union() -> None:
     names, united = places.unite_rows(np.array([7, 7, 9]), shapes, 1e-12)
     assert names.tolist() == [9]
     assert shapely.area(united).tolist() == [1.0]
+
+
+def test_triangles_whose_shadows_reach_a_floor_are_found() -> None:
+    """Against all shadows, one by one; those of neighbours that only come close are discarded."""
+    rng = np.random.default_rng(8)
+    corners = rng.uniform(-3, 3, (400, 1, 3)) + rng.normal(0, 0.5, (400, 3, 3))
+    corners = corners[np.argsort(corners[:, :, 0].min(axis=1))]
+    angle = np.linspace(0, 2 * np.pi, 6)[:5] + rng.uniform(0, 1, (40, 1))
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=2) * rng.uniform(0.1, 1, (40, 1, 1))
+    plan = shapely.polygons(ring + rng.uniform(-2, 2, (40, 1, 2)))
+    slope = rng.uniform(-0.5, 0.5, (40, 3))
+    band, reach = (0.2, 1.0), 0.25
+    row, near = places._pairs_near(corners, plan, slope, band, reach)
+    pairs = set(zip(row.tolist(), near.tolist(), strict=True))
+    assert len(pairs) == len(row)
+    every, other = np.meshgrid(np.arange(40), np.arange(400), indexing="ij")
+    every, other = every.ravel(), other.ravel()
+    height = places.heights_above(corners[other], slope[every])
+    names, shadow = places.shadows(corners[other][:, :, [0, 2]], height, band, np.arange(16000))
+    reached = names[shapely.dwithin(shadow, plan[every[names]], reach)]
+    expected = set(zip(every[reached].tolist(), other[reached].tolist(), strict=True))
+    assert expected <= pairs
+    assert len(expected) <= len(pairs) < 1.2 * len(expected)
