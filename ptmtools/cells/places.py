@@ -47,7 +47,7 @@ from ptmtools.tolerance import TOUCH_SHARE, Tolerance
 #: A shape of less area for its length than this share of a radius is a line.
 _THIN = 4e-3
 #: A region is compared with one of the triangles about it, then with this many times more.
-_GROWTH = 1.25
+_GROWTH = 1.5
 #: Number of pairs of a region and a triangle for which there is space at first, for each region.
 _PAIRS = 16
 #: Regions with more triangles about them, and shapes of more corners, are cut in two,

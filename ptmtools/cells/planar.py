@@ -38,7 +38,7 @@ from ptmtools.tolerance import GRID_SHARE, ROUNDING_SHARE, Tolerance
 #: A shapely geometry, or an array of them.
 Geometry = Any
 
-_COLLECTION = 7
+_AREAS, _COLLECTION = (3, 6), 7
 #: Number of polygons that are united at a time.
 _CHUNK = 256
 #: Grids that are tried, in steps of the first: up to the distance that counts as rounding.
@@ -244,7 +244,9 @@ def _union(polygons: Geometry, grid: float, more: bool) -> Geometry:
     """The union of an array of polygons on a grid; see the module's head."""
     try:
         united = shapely.union_all(polygons, grid_size=grid)
-        return united if shapely.is_empty(united) else _polygonal(united)
+        # `_polygonal` of a single shape takes as long as a small union.
+        areas = shapely.get_type_id(united) in _AREAS or shapely.is_empty(united)
+        return united if areas else _polygonal(united)
     except shapely.GEOSException:
         pass
     if len(polygons) == 1:
