@@ -262,15 +262,15 @@ def sides_separate(corner: Floats, shadow: Floats, hull: Floats, reach: float) -
         p, q = corner[k], corner[(k + 1) % 3]
         x, z = q[2] - p[2], p[0] - q[0]
         margin = reach * (x * x + z * z) ** 0.5
-        least, most = np.inf, -np.inf
+        least, greatest = np.inf, -np.inf
         for s in range(len(shadow)):
             away = x * shadow[s, 0] + z * shadow[s, 1]
-            least, most = min(least, away - margin), max(most, away + margin)
+            least, greatest = min(least, away - margin), max(greatest, away + margin)
         before = after = True
         for s in range(len(hull)):
             away = x * hull[s, 0] + z * hull[s, 1]
             before &= away < least
-            after &= away > most
+            after &= away > greatest
         if before or after:
             return True
     return False

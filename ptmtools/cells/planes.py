@@ -92,8 +92,10 @@ def bounds(corners: Floats) -> tuple[Floats, Floats]:
 def boxes_meet(low: Floats, high: Floats, boxes: Floats) -> Bools:
     """(n,) which of the boxes between (n, 3) corners meet one of (m, 2, 3) boxes."""
     if len(boxes) <= _FEW:
-        met = ((low <= box[1]) & (high >= box[0]) for box in boxes)
-        return np.any([np.zeros(len(low), np.bool_), *(axes.all(axis=1) for axes in met)], axis=0)
+        meets = np.zeros(len(low), dtype=np.bool_)
+        for lowest, highest in boxes:
+            meets |= ((low <= highest) & (high >= lowest)).all(axis=1)
+        return meets
     x0, z0 = low[:, PLAN].T
     x1, z1 = high[:, PLAN].T
     (u0, bottom, w0), (u1, top, w1) = boxes.transpose(1, 2, 0)

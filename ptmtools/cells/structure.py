@@ -153,12 +153,12 @@ def find_walls(
         sure = area
         scanned = not facets and _is_scan(area, leans)
     kept = np.flatnonzero((sure > 0) & ~(scanned & leans))
-    return walls[kept][rank(area[kept])].tolist(), np.count_nonzero(sure) - len(kept)
+    return walls[kept][rank(area[kept])].tolist(), int(np.count_nonzero(sure)) - len(kept)
 
 
 def _is_scan(area: Floats, leans: Bools) -> bool:
     """Whether walls of (n,) areas, m², 0 for none, are very many, and most of them by area lean."""
-    return np.count_nonzero(area) >= _MANY and bool(2 * area[leans].sum() > area.sum())
+    return bool(np.count_nonzero(area) >= _MANY and 2 * area[leans].sum() > area.sum())
 
 
 def _wall_in(structure: Structure, plane: Floats, least: float) -> tuple[WallPlane | None, float]:
