@@ -200,10 +200,10 @@ def encode_image(
     Raises as `encode_steps` and `load_image`.
     """
     from ptmtools.texture import load_image, read_header
-    from ptmtools.texture.hidden import spread_colors
     from ptmtools.texture.images.files import check_depth
     from ptmtools.texture.images.opening import LOSSY
     from ptmtools.texture.model import Description, Limits
+    from ptmtools.texture.samples import spread_colors
     from ptmtools.texture.steps import encode_steps
 
     with naming(name):

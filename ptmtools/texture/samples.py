@@ -131,3 +131,22 @@ def round_to_eight_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
         return ((samples.astype(np.uint32) * 255 + largest // 2) // largest).astype(np.uint8)
     finite = np.nan_to_num(samples.astype(np.float32))
     return np.rint(np.clip(finite, 0, 1) * 255).astype(np.uint8)
+
+
+def spread_colors(texels: NDArray[Any]) -> NDArray[Any]:
+    """(h, w, c) texels, those of alpha 0 in the colours of the visible ones around; the same array
+    if alpha hides none, or all, or if they are floats.
+
+    Levels are means of texels, and filters mix neighbours by their distance alone: hidden white or
+    black would show at the edges of a cut-out, and from afar all over it. (Tried: means that alpha
+    weights. Then no level is the mean of the next, of which the coders of differences depend.
+    Colours multiplied by alpha lose their low bits.)
+    """
+    import numpy as np
+
+    from ptmtools.arrays import fill_gaps
+
+    alpha = texels[..., -1]
+    if texels.shape[2] not in (2, 4) or texels.dtype.kind != "u" or alpha.all() or not alpha.any():
+        return texels
+    return np.concatenate([fill_gaps(texels[..., :-1], alpha), alpha[..., None]], axis=2)
