@@ -49,8 +49,8 @@ def building_notes(building: Building) -> Iterator[str]:
     yield from building.volumes.notes
     if building.facets:
         yield (
-            f"{building.facets:,} flat pieces lean in all directions, like a scan or terrain, and "
-            "do not divide space; --structural NAME makes objects do so"
+            f"at least {building.facets:,} flat pieces lean in all directions, like a scan or "
+            "terrain, and do not divide space; --structural NAME makes objects do so"
         )
     if building.hangings:
         surfaces = count(building.hangings, "surface")

@@ -217,7 +217,7 @@ class LightBaking:
         # Of one ray no variance is known.
         first = max(2, math.ceil(self.options.light_samples * _FIRST))
         lit = self.building.look(corner[rows], side[rows], first, near)
-        point = grid.spread(lit.goes_on)
+        point = grid.reading_points(lit.goes_on)
         light, variance, covered = lit.indirect(grid.face, point, turn)
         # What few rays meet, as a window far away, is missed by most of the texels around.
         rays = np.ones(len(light), np.float32)

@@ -1,8 +1,8 @@
 """The lightmap of a mesh, and light at vertices.
 
 A texel has the light of its centre, also where a look-up on a face reads it but no face holds its
-centre, if the surface goes on there in another cell; else, as on sills thinner than a texel, that
-of the nearest point of its face. What no face reads, and what is covered, takes the nearest value.
+centre, if the surface goes on there, as in another cell; else, as on sills, that of the nearest
+point of its face. What no face reads, and what is covered, takes the nearest value.
 
 Light by rays has grain. Each of four rounds takes the plane through 25 texels of the same chart, at
 twice the distance of the round before, of which those count less that differ by more than the
@@ -87,7 +87,7 @@ class TexelGrid:
         share += INWARD_SHARE * (1 / 3 - share)
         return np.asarray(np.einsum("nk,nkx->nx", share, self.corner[self.face[number]]))
 
-    def spread(self, goes_on: Callable[[Ints, Floats, Floats], Bools]) -> Floats:
+    def reading_points(self, goes_on: Callable[[Ints, Floats, Floats], Bools]) -> Floats:
         """(n, 3) `points`, or the centres of texels themselves, in the planes of faces, where the
         surface ``goes_on`` from the points of these to them: parts of a wall in two cells agree."""
         points = self.points()
@@ -195,10 +195,7 @@ def smooth(
     """One round: (h, w, k) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
     and `_TAPS`."""
     height, width, channels = value.shape
-    result, rest, mean = np.zeros_like(value), np.zeros_like(variance), np.zeros_like(variance)
-    for row in range(height):
-        for column in range(width):
-            mean[row, column] = value[row, column].mean()
+    result, rest, mean = np.zeros_like(value), np.zeros_like(variance), value.sum(axis=2) / channels
     share, moment = np.empty(len(taps)), np.empty((3, 3))
     for row in range(height):
         for column in range(width):
@@ -231,9 +228,7 @@ def smooth(
                     rest[row, column] += part * part * variance[r, c]
                     for a in range(channels):
                         result[row, column, a] += part * value[r, c, a]
-            for a in range(channels):
-                result[row, column, a] = max(result[row, column, a], 0.0)
-    return result, rest
+    return np.maximum(result, 0), rest
 
 
 @kernel

@@ -212,8 +212,9 @@ def _ranks(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> Ints:
     """(L,) the rank of each leaf: 0 of rooms with a name, else by its `SpaceKind`, roofs after the
     ground; that of leaves that do not stand is meaningless."""
     result = np.zeros(cells.leaf_count, dtype=np.int64)
-    named = np.array([bool(cells.room_name(cell)) for cell in range(cells.cell_count)] + [False])
-    leaves = np.flatnonzero(cells.leaf_standing & ~named[cells.leaf_cell])
+    named = np.array([bool(cells.room_name(cell)) for cell in range(cells.cell_count)])
+    leaves = np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0))
+    leaves = leaves[~named[cells.leaf_cell[leaves]]]
     if not len(leaves):
         return result
     points = np.stack([_look_points(cells.leaf_points(leaf)) for leaf in leaves.tolist()])

@@ -3,12 +3,8 @@
 The rays of `ptmtools.rendering.rays` pass through them. Here they meet them on their way to the
 surface behind, the nearest first. Where a material has a cutoff, texels of less alpha are not drawn
 and all others are opaque; other layers blend as their colours are encoded, the farthest first. A
-ray ends at an opaque texel, so that foliage costs no more than the leaves before the first.
-
-A cutoff tests texels of the finest level. The alpha of a coarser one is the share of these that are
-drawn, if they have alpha 0 or 1, and so is that of a look-up between texels that is as wide; tested
-again, a grille of which a quarter is bars would be gone from afar. So alpha itself is the share of
-a look-up of a texel of the next level or wider, and between these two the test fades into it.
+ray ends at an opaque texel, or where next to nothing is left of it, so that foliage costs little
+more than the leaves before. From afar the alpha of a cut-out is its share (docs/formats/hints.md).
 
 Each ray has its own order. The page draws whole batches by the distance of the middles of their
 boxes, so it differs where layers of several batches reach around each other.
@@ -109,7 +105,7 @@ class Layers:
         hit = np.flatnonzero(triangle >= 0)
         place, normal = (vectors[triangle[hit]] for vectors in self._all)
         end[hit] = _distance(sight.eye, ray[hit], place, normal)
-        waiting, gone = np.arange(len(ray)), np.zeros(len(ray))
+        waiting, gone, rest = np.arange(len(ray)), np.zeros(len(ray)), np.ones(len(ray))
         for _ in range(MOST):
             start = sight.eye - self._middle + ray[waiting] * gone[waiting][:, None]
             rays = start.astype(np.float32), ray[waiting].astype(np.float32)
@@ -137,7 +133,8 @@ class Layers:
             if blends.any():
                 layer = waiting[blends].astype(np.int32), met[blends].astype(np.int32)
                 layers.append(Layer(*layer, share[blends].astype(np.float32)))
-            waiting = waiting[~opaque]
+            rest[waiting] *= 1 - share
+            waiting = waiting[rest[waiting] >= LEAST_ALPHA]
         return layers
 
     def _front(

@@ -182,7 +182,9 @@ class SteppedBytes:
         texels = picture.array()
         alpha, opaque = texels[..., -1], np.iinfo(texels.dtype).max
         slope = np.maximum(_spans(alpha) / 2, 1)
-        steps = np.clip(0.5 + (alpha - self.cutoff * opaque) / slope, 0, 1)
+        # Between the last value that is not drawn and the first that is.
+        middle = np.ceil(self.cutoff * opaque) - 0.5
+        steps = np.clip(0.5 + (alpha - middle) / slope, 0, 1)
         alpha = np.rint(opaque * steps).astype(texels.dtype)
         return derived_png(picture, np.concatenate([_colors(texels), alpha[..., None]], axis=2))
 

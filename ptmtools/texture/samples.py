@@ -138,9 +138,7 @@ def spread_colors(texels: NDArray[Any]) -> NDArray[Any]:
     if alpha hides none, or all, or if they are floats.
 
     Levels are means of texels, and filters mix neighbours by their distance alone: hidden white or
-    black would show at the edges of a cut-out, and from afar all over it. (Tried: means that alpha
-    weights. Then no level is the mean of the next, of which the coders of differences depend.
-    Colours multiplied by alpha lose their low bits.)
+    black would show at the edges of a cut-out, and from afar all over it (docs/design/codec.md).
     """
     import numpy as np
 

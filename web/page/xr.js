@@ -35,6 +35,7 @@ function drawingBoth(walk, look, layer) {
       Reflect.deleteProperty(renderer, "draw");
     }
     if (gl.isContextLost()) return;
+    if (!layer.antialias) renderer.samples = 1;
     gl.bindFramebuffer(gl.FRAMEBUFFER, layer.framebuffer);
     gl.enable(gl.SCISSOR_TEST);
     eyes.forEach((eye, k) => {
@@ -47,6 +48,7 @@ function drawingBoth(walk, look, layer) {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   };
   return () => {
+    walk.picture.renderer.samples = walk.gl.getParameter(walk.gl.SAMPLES) || 1;
     Reflect.deleteProperty(walk, "frame");
     walk.viewport = viewport;
     walk.picture.turn();

@@ -20,10 +20,7 @@ class CellsStage(Stage["Cells"]):
     name = "cells"
     about = "Read a model and divide its space into cells and portals."
     recipe = 12
-    changed = (
-        "division ends where it saves visitors little (--gain); cells are walkable space, or "
-        "space visible from it"
-    )
+    changed = "the edges of walkable floors differ by rounding"
     options = SubdivideOptions
     reads = (SCENE,)
     artifact = Lazy("ptmtools.cells.model:Cells")

@@ -135,16 +135,7 @@ class EmitStage(Stage[None]):
     name = "emit"
     about = "Write the served files: cells and hints."
     recipe = 18
-    changed = (
-        "the exposure of a cell balances its white; "
-        "GLBs have normals of what is curved and reflects; "
-        "portals that door leaves cover are marked as passages; GLBs are compressed; the "
-        "hints hold the previews of textures, the errors and the "
-        "effect of each texture level, mean colours, GPU sizes of texels, and the resolution "
-        "needed in each cell; "
-        "viewpoints face pictures; hulls with slivers and portals with short edges are convex in "
-        "float32 and float64; objects with thousands of triangles have levels of detail"
-    )
+    changed = "walks through buildings without ceilings begin in rooms"
     options = EmitOptions
 
     def read_with(self, options: EmitOptions) -> tuple[Stage[Any], ...]:

@@ -316,6 +316,8 @@ def _alpha(entry: dict[str, Any], factor: float) -> dict[str, Any]:
     """The effect of alpha by the mode of a material, as fields of a `SourceMaterial`."""
     mode = entry.get("alphaMode", "OPAQUE")
     cutoff = float(entry.get("alphaCutoff", 0.5)) if mode == "MASK" else 0.0
+    if mode == "MASK" and cutoff <= 0:
+        mode = "OPAQUE"
     opacity = {"BLEND": factor, "MASK": float(factor >= cutoff)}.get(mode, 1.0)
     tested = mode == "MASK" and opacity and factor > 0
     return {
