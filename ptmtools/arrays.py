@@ -112,6 +112,5 @@ def fill_gaps(value: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
 
 def _sums(values: Singles) -> Singles:
     """Of 2 × 2 values, in one order on all machines; a last odd row or column has no others."""
-    odd = [(0, side % 2) for side in values.shape]
-    even = np.pad(values, odd) if np.any(odd) else values
+    even = np.pad(values, [(0, side % 2) for side in values.shape])
     return (even[::2, ::2] + even[::2, 1::2]) + (even[1::2, ::2] + even[1::2, 1::2])

@@ -30,6 +30,8 @@ from ptmtools.tolerance import GRAZING_COSINE, RAY_STEP_SHARE
 MOST = 64
 #: Rays that are followed at a time.
 _BATCH = 1 << 18
+#: A ray of which less is left ends.
+_SPENT = 1e-6
 #: Least length of a normal, m²: a triangle without area has none.
 _FLAT = 1e-300
 
@@ -134,7 +136,7 @@ class Layers:
                 layer = waiting[blends].astype(np.int32), met[blends].astype(np.int32)
                 layers.append(Layer(*layer, share[blends].astype(np.float32)))
             rest[waiting] *= 1 - share
-            waiting = waiting[rest[waiting] >= LEAST_ALPHA]
+            waiting = waiting[rest[waiting] >= _SPENT]
         return layers
 
     def _front(

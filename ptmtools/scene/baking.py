@@ -179,10 +179,8 @@ class SteppedBytes:
 
     def __call__(self) -> bytes:
         picture = integers(self.read(), self.limit)
-        texels = picture.array()
-        alpha, opaque = texels[..., -1], np.iinfo(texels.dtype).max
-        slope = np.maximum(_spans(alpha) / 2, 1)
-        # Between the last value that is not drawn and the first that is.
+        alpha = (texels := picture.array())[..., -1]
+        opaque, slope = np.iinfo(texels.dtype).max, np.maximum(_spans(alpha) / 2, 1)
         middle = np.ceil(self.cutoff * opaque) - 0.5
         steps = np.clip(0.5 + (alpha - middle) / slope, 0, 1)
         alpha = np.rint(opaque * steps).astype(texels.dtype)

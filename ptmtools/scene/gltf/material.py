@@ -316,13 +316,11 @@ def _alpha(entry: dict[str, Any], factor: float) -> dict[str, Any]:
     """The effect of alpha by the mode of a material, as fields of a `SourceMaterial`."""
     mode = entry.get("alphaMode", "OPAQUE")
     cutoff = float(entry.get("alphaCutoff", 0.5)) if mode == "MASK" else 0.0
-    if mode == "MASK" and cutoff <= 0:
-        mode = "OPAQUE"
     opacity = {"BLEND": factor, "MASK": float(factor >= cutoff)}.get(mode, 1.0)
-    tested = mode == "MASK" and opacity and factor > 0
+    tested = cutoff > 0 and opacity and factor > 0
     return {
         "opacity": opacity,
-        "ignores_alpha": mode not in ("MASK", "BLEND"),
+        "ignores_alpha": mode != "BLEND" and cutoff <= 0,
         # The cutoff of a texel, because the factor's alpha scales all texels.
         "cutoff": max(cutoff / factor, 0.0) if tested else None,
     }
