@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
@@ -284,8 +283,7 @@ def _place_in(
     least, greatest = room.section.min(axis=0), room.section.max(axis=0)
     near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= greatest)).all(axis=1)
     sides = np.stack([room.section, np.roll(room.section, -1, axis=0)], axis=1)
-    around = shapely.multilinestrings(np.concatenate([walls[near], sides]))
-    clearance = shapely.distance(shapely.points(grid), around)
+    clearance = _distance(grid, np.concatenate([walls[near], sides]))
     grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
     position = np.insert(grid, 1, room.floor + eye, axis=1)
     floor = ground.floor_below(position)
@@ -322,3 +320,13 @@ def _grid(polygon: Floats) -> Floats:
     inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
     inner: Floats = points[inside]
     return inner if len(inner) else polygon.mean(axis=0)[None]
+
+
+def _distance(points: Floats, segments: Floats) -> Floats:
+    """(n,) distance of each (n, 2) point to the nearest of (m, 2, 2) segments."""
+    a, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    to = points[:, None] - a
+    share = np.clip((to * along).sum(axis=2) / length, 0, 1)
+    off = share[..., None] * along - to
+    return np.asarray(np.sqrt((off**2).sum(axis=2)).min(axis=1))

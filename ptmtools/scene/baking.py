@@ -181,7 +181,7 @@ class SteppedBytes:
         picture = integers(self.read(), self.limit)
         alpha = (texels := picture.array())[..., -1]
         opaque, slope = np.iinfo(texels.dtype).max, np.maximum(_spans(alpha) / 2, 1)
-        middle = np.ceil(self.cutoff * opaque) - 0.5
+        middle = np.ceil(round(self.cutoff * opaque, 6)) - 0.5
         steps = np.clip(0.5 + (alpha - middle) / slope, 0, 1)
         alpha = np.rint(opaque * steps).astype(texels.dtype)
         return derived_png(picture, np.concatenate([_colors(texels), alpha[..., None]], axis=2))
