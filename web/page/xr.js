@@ -17,6 +17,7 @@ const NEAR = 0.1;
  */
 function drawingBoth(walk, look, layer) {
   const { frame, viewport } = walk, { tall, aspect, lines } = viewport;
+  const { samples } = walk.picture.renderer;
   let view = { tall, aspect, lines };
   walk.viewport = Object.create(viewport, {
     full: { value: true }, settle: { value: () => false },
@@ -48,7 +49,7 @@ function drawingBoth(walk, look, layer) {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   };
   return () => {
-    walk.picture.renderer.samples = walk.gl.getParameter(walk.gl.SAMPLES) || 1;
+    walk.picture.renderer.samples = samples;
     Reflect.deleteProperty(walk, "frame");
     walk.viewport = viewport;
     walk.picture.turn();
