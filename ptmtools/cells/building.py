@@ -162,7 +162,7 @@ class Building:
         if not forced:
             sizes = options.wall_area, options.wall_thickness
             walls, hangings = without_hangings(walls, structure, *sizes)
-        walker = Walker(*map(float, options.walker))
+        walker = Walker(*options.walker)
         solid = structure.corners[~structure.door | (options.doors == "closed")]
         floors = Floors.from_fabric(fabric, GRAIN * walker.radius)
         places = find_places(floors, solid, walker, tolerance, executor)
@@ -194,7 +194,7 @@ class Building:
 
     @property
     def walker(self) -> Walker:
-        return Walker(*map(float, self.options.walker))
+        return Walker(*self.options.walker)
 
     def cost(self, tree: Tree) -> float:
         """`Viewing.cost`; 0 if the model is divided to the end, whatever that saves."""

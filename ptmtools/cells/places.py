@@ -381,7 +381,7 @@ class _Search(NamedTuple):
 
     def _places(self, plan: Geometry, region: Ints) -> tuple[Geometry, Ints]:
         walker, tolerance = self.walker, self.tolerance
-        body, foot = (walker.step, walker.height), (2 * tolerance.plane, walker.step)
+        body, foot = (step := float(walker.step), float(walker.height)), (2 * tolerance.plane, step)
         slope = self.slope[region]
         around = self._select_near(self.structure, plan, walker.radius)
         plan, part = clear_of(around, plan, slope, body, walker.radius, tolerance)
