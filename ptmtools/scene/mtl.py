@@ -1,4 +1,4 @@
-"""Reads MTL, the materials of an OBJ file.
+"""Reads MTL, the materials of an OBJ file, and finds their images.
 
 The reader keeps the statements that the emitted files use: ``Kd``, ``d``/``Tr``, ``map_Kd``,
 ``map_d``, ``norm`` and ``bump``/``map_Bump``, ``Ke`` and ``map_Ke`` for light, ``Pm``, ``Pr`` and
@@ -15,11 +15,20 @@ import re
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ptmtools.errors import LimitError
 from ptmtools.files import open_regular
+from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.notes import IngestNotes
-from ptmtools.scene.source import decode
+from ptmtools.scene.source import (
+    DARK,
+    FileRange,
+    NormalTexture,
+    SourceMaterial,
+    SourceTexture,
+    decode,
+)
 
 #: Size limit of a library, MiB; those of whole cities have a few.
 LARGEST = 64
@@ -255,3 +264,115 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
             material.map_ks, material.map_ks_fault = parse_map(rest, line), ""
         except ValueError as error:
             material.map_ks_fault = str(error)
+
+
+def resolve_material(
+    material: MtlMaterial, notes: IngestNotes, *, used: bool, normals: bool
+) -> tuple[SourceMaterial, MapStatement | None]:
+    """A material without its name, and the statement of its colours, or of the emission that stands
+    for them. Images are looked up if it is ``used``, normal maps if ``normals``."""
+    texture = mask = normal = None
+    if used:
+        texture = _texture(material, "map_Kd", material.map_kd, notes)
+        mask = _texture(material, "map_d", material.map_d, notes)
+        normal = _normal(material, texture, notes) if normals else None
+    glow, shown = _glow(material, notes, used), material.map_kd
+    if texture is None:
+        dark = max(material.color or (1.0,)) <= DARK
+        shown = material.map_ke if dark and glow.get("glow_map") else None
+    resolved = SourceMaterial(
+        name="",
+        color=material.color,
+        opacity=material.dissolve,
+        # A missing mask must not hide anything.
+        see_through=material.dissolve < 1 or (material.map_d is not None and mask is None),
+        texture=texture,
+        mask=mask,
+        shine=_shine(material),
+        normal=normal,
+        **glow,
+        **_matter(material, notes, used),
+    )
+    return resolved, shown
+
+
+def _normal(
+    material: MtlMaterial, texture: SourceTexture | None, notes: IngestNotes
+) -> NormalTexture | None:
+    """The normal map of a material; with the coordinates as written if it has no ``texture``."""
+    if material.relief is None:
+        return None
+    key, statement = material.relief
+    image = _texture(material, key, statement, notes)
+    if image is None:
+        return None
+    return NormalTexture(image, statement.strength, height=key != "norm", own=texture is None)
+
+
+def _shine(material: MtlMaterial) -> Shine | None:
+    colors, reflection, base = material.map_kd, material.map_ks, material.library.parent
+    if material.map_ks_fault:
+        return Shine("", base, f"map_Ks: {material.map_ks_fault}")
+    if reflection is None:
+        return None
+    same = colors is None or (colors.scale, colors.offset) == (reflection.scale, reflection.offset)
+    return Shine(reflection.file, base, "" if same else "other texture coordinates")
+
+
+def _glow(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
+    """The emission of a material, as the fields of a `SourceMaterial`. ``Ke`` is a factor of
+    ``map_Ke``; without ``Ke`` it is 1. An image that is missing counts as white."""
+    glow = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
+    if not (used and any(glow)):
+        return {}
+    image = _texture(material, "map_Ke", material.map_ke, notes, optional=True)
+    return {"glow": glow, "glow_map": image}
+
+
+def _matter(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
+    """Metallic and roughness of a material, as the fields of a `SourceMaterial`. A map replaces the
+    number, which many programs write as 0 beside it; one that is missing is matt."""
+    fields: dict[str, Any] = {"metallic": material.pm, "roughness": material.roughness}
+    if used and material.map_pm is not None:
+        fields["metallic_map"] = _texture(material, "map_Pm", material.map_pm, notes, optional=True)
+        fields["metallic"] = float(fields["metallic_map"] is not None)
+    if used and material.map_pr is not None:
+        fields["roughness_map"] = _texture(
+            material, "map_Pr", material.map_pr, notes, optional=True
+        )
+        fields["roughness"] = 1.0
+    return fields
+
+
+def _texture(
+    material: MtlMaterial,
+    key: str,
+    statement: MapStatement | None,
+    notes: IngestNotes,
+    *,
+    optional: bool = False,
+) -> SourceTexture | None:
+    """An image, with notes on its absence and ignored options, unless it is ``optional``."""
+    if statement is None:
+        return None
+    place = f"{notes.folder.label(material.library)}:{statement.line}"
+    what, base = f"{key} {statement.file}", material.library.parent
+    if optional:
+        file = notes.folder.find(statement.file, base).path
+    else:
+        file = notes.locate(statement.file, what, place, base=base)
+    if file is None:
+        return None
+    wrap: Wrap = "clamp" if statement.clamp else "repeat"
+    image = SourceTexture(FileRange(file), file.name, what, place, wrap, wrap, statement.channel)
+    if optional:
+        return image
+    if statement.ignored:
+        notes.note("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
+    transform, colors = (statement.scale, statement.offset), material.map_kd
+    if transform != ((1.0, 1.0), (0.0, 0.0)):
+        if key == "map_Kd":
+            notes.note("PTM-N215", f"{what}: -s and -o baked into its faces", place)
+        elif colors is None or transform != (colors.scale, colors.offset):
+            notes.note("PTM-N215", f"{what}: ignored -s -o", place)
+    return image

@@ -1,4 +1,4 @@
-"""Reads Wavefront OBJ files and resolves their materials.
+"""Reads Wavefront OBJ files; `mtl` resolves their materials.
 
 trimesh (5.2) is not used because it reads the first ``mtllib`` only, supports neither ``d``, ``Tr``
 and ``map_d`` nor the options of ``map_Kd``, cuts concave quads and polygons as fans, joins the
@@ -14,30 +14,21 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.model import Shine, Wrap
-from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
+from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl, resolve_material
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.options import MAX_VERTICES, IngestOptions, too_many_triangles
 from ptmtools.scene.polygon import triangulate
-from ptmtools.scene.source import (
-    DARK,
-    FileRange,
-    ModelSource,
-    NormalTexture,
-    SourceMaterial,
-    SourceTexture,
-    vertex_colors,
-)
+from ptmtools.scene.source import ModelSource, SourceMaterial, vertex_colors
 
 #: The next file of a mtllib statement, up to its suffix, or the rest of the statement.
 _LIBRARIES = re.compile(r".*?\.mtl[\"']*(?: |$)|.+", re.IGNORECASE)
@@ -68,33 +59,10 @@ def resolve_materials(
                 notes.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
             materials.append(SourceMaterial(name or "default"))
             continue
-        texture = mask = normal = None
-        if index in used:
-            texture = _texture(material, "map_Kd", material.map_kd, notes)
-            mask = _texture(material, "map_d", material.map_d, notes)
-            normal = _normal(material, texture, notes) if normals else None
-        glow = _glow(material, notes, index in used)
-        shown = material.map_kd
-        if texture is None:
-            dark = max(material.color or (1.0,)) <= DARK
-            shown = material.map_ke if dark and glow.get("glow_map") else None
+        resolved, shown = resolve_material(material, notes, used=index in used, normals=normals)
         if shown is not None:
             maps[index] = shown
-        materials.append(
-            SourceMaterial(
-                name=name,
-                color=material.color,
-                opacity=material.dissolve,
-                # A missing mask must not hide anything.
-                see_through=material.dissolve < 1 or (material.map_d is not None and mask is None),
-                texture=texture,
-                mask=mask,
-                shine=_shine(material),
-                normal=normal,
-                **glow,
-                **_matter(material, notes, index in used),
-            )
-        )
+        materials.append(replace(resolved, name=name))
     return tuple(materials), maps
 
 
@@ -119,93 +87,12 @@ def _library_materials(
     return defined
 
 
-def _normal(
-    material: MtlMaterial, texture: SourceTexture | None, notes: IngestNotes
-) -> NormalTexture | None:
-    """The normal map of a material; with the coordinates as written if it has no ``texture``."""
-    if material.relief is None:
-        return None
-    key, statement = material.relief
-    image = _texture(material, key, statement, notes)
-    if image is None:
-        return None
-    return NormalTexture(image, statement.strength, height=key != "norm", own=texture is None)
-
-
-def _shine(material: MtlMaterial) -> Shine | None:
-    colors, reflection, base = material.map_kd, material.map_ks, material.library.parent
-    if material.map_ks_fault:
-        return Shine("", base, f"map_Ks: {material.map_ks_fault}")
-    if reflection is None:
-        return None
-    same = colors is None or (colors.scale, colors.offset) == (reflection.scale, reflection.offset)
-    return Shine(reflection.file, base, "" if same else "other texture coordinates")
-
-
-def _glow(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
-    """The emission of a material, as the fields of a `SourceMaterial`. ``Ke`` is a factor of
-    ``map_Ke``; without ``Ke`` it is 1. An image that is missing counts as white."""
-    glow = material.glow or (0.0 if material.map_ke is None else 1.0,) * 3
-    if not (used and any(glow)):
-        return {}
-    image = material.map_ke and _optional_texture(material, "map_Ke", material.map_ke, notes)
-    return {"glow": glow, "glow_map": image}
-
-
-def _optional_texture(
-    material: MtlMaterial, key: str, statement: MapStatement, notes: IngestNotes
-) -> SourceTexture | None:
-    """An image whose absence is not noted."""
-    file = notes.folder.find(statement.file, material.library.parent).path
-    if file is None:
-        return None
-    what = f"{key} {statement.file}"
-    place = f"{notes.folder.label(material.library)}:{statement.line}"
-    wrap: Wrap = "clamp" if statement.clamp else "repeat"
-    return SourceTexture(FileRange(file), file.name, what, place, wrap, wrap, statement.channel)
-
-
-def _matter(material: MtlMaterial, notes: IngestNotes, used: bool) -> dict[str, Any]:
-    """Metallic and roughness of a material, as the fields of a `SourceMaterial`. A map replaces the
-    number, which many programs write as 0 beside it; one that is missing is matt."""
-    fields: dict[str, Any] = {"metallic": material.pm, "roughness": material.roughness}
-    if used and material.map_pm is not None:
-        fields["metallic_map"] = _optional_texture(material, "map_Pm", material.map_pm, notes)
-        fields["metallic"] = float(fields["metallic_map"] is not None)
-    if used and material.map_pr is not None:
-        fields["roughness_map"] = _optional_texture(material, "map_Pr", material.map_pr, notes)
-        fields["roughness"] = 1.0
-    return fields
-
-
 def _renaming_hint(path: Path, name: str) -> str:
     """A hint for a missing library: a renamed model still refers to the old name of its library."""
     libraries = [p.name for p in path.absolute().parent.glob("*") if p.suffix.lower() == ".mtl"]
     if len(libraries) != 1:
         return ""
     return f"; if {libraries[0]} is the library of the model, rename it to {Path(name).name}"
-
-
-def _texture(
-    material: MtlMaterial, key: str, statement: MapStatement | None, notes: IngestNotes
-) -> SourceTexture | None:
-    if statement is None:
-        return None
-    place = f"{notes.folder.label(material.library)}:{statement.line}"
-    what = f"{key} {statement.file}"
-    file = notes.locate(statement.file, what, place, base=material.library.parent)
-    if file is None:
-        return None
-    if statement.ignored:
-        notes.note("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
-    transform, colors = (statement.scale, statement.offset), material.map_kd
-    if transform != ((1.0, 1.0), (0.0, 0.0)):
-        if key == "map_Kd":
-            notes.note("PTM-N215", f"{what}: -s and -o baked into its faces", place)
-        elif colors is None or transform != (colors.scale, colors.offset):
-            notes.note("PTM-N215", f"{what}: ignored -s -o", place)
-    wrap: Wrap = "clamp" if statement.clamp else "repeat"
-    return SourceTexture(FileRange(file), file.name, what, place, wrap, wrap, statement.channel)
 
 
 #: Statements without effect on surfaces, skipped without a note.
