@@ -42,18 +42,18 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (72_540, 350),
+    "ptmtools": (72_535, 350),
     "ptmtools/*.py": (4_170, 26),
     "ptmtools/cells": (8_924, 29),
     "ptmtools/cli": (3_110, 15),
     "ptmtools/coverage": (2_565, 15),
-    "ptmtools/light": (3_418, 15),
+    "ptmtools/light": (3_447, 15),
     "ptmtools/meshopt": (870, 5),
     "ptmtools/output": (7_950, 38),
-    "ptmtools/pipeline": (4_057, 20),
+    "ptmtools/pipeline": (4_009, 20),
     "ptmtools/portal_flow": (1_680, 8),
     "ptmtools/rendering": (2_047, 13),
-    "ptmtools/scene": (11_931, 60),
+    "ptmtools/scene": (11_939, 60),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_747, 25),

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -27,7 +27,6 @@ from ptmtools.texture.model import EncodeOptions
 from ptmtools.texture.previews import FORMATS, LOSSLESS, Preview, PreviewOptions
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from ptmtools.executor import Executor
@@ -153,41 +152,6 @@ def bake_textures(
         total += len(files[0][1]) if files else 0
     run.progress(len(tasks), len(tasks), unit)
     return results, total
-
-
-#: Times that an image of codes is encoded, at most, and the mean error that needs no other.
-_TRIES, _UNSEEN = 3, 0.25
-
-
-def lossy_codes(texels: NDArray[np.float32], quality: Mapping[str, int]) -> tuple[str, bytes]:
-    """The format and the image of (h, w, 3) codes of light, 0 to 255: AVIF, or WebP where Pillow
-    cannot write it. ``quality``: of each format.
-
-    Encoders round differences of colour down: whole rooms would turn green. So codes are dithered,
-    and the image is encoded again without the mean error of the time before; the least counts.
-    """
-    import numpy as np
-    from PIL import features
-
-    from ptmtools.texture.previews import decode_preview, image_bytes
-
-    name = "avif" if features.check("avif") else "webp"
-    # Light is smooth, and its hue shows on white walls.
-    full = {"subsampling": "4:4:4"} if name == "avif" else {}
-    tries: list[tuple[float, bytes]] = []
-    moved = np.zeros(3)
-    row, column, channel = np.ogrid[tuple(map(slice, texels.shape))]
-    # A sequence with little discrepancy in two dimensions (Roberts).
-    noise = (0.7548777 * row + 0.5698403 * column + channel / 3) % 1 - 0.5
-    for _ in range(_TRIES):
-        rounded = np.rint(np.clip(texels + noise - moved, 0, 255)).astype(np.uint8)
-        data = image_bytes(rounded, name, quality[name], **full)
-        error = (decode_preview(data, 3) - texels).mean(axis=(0, 1), dtype=np.float64)
-        tries.append((float(np.abs(error).max()), data))
-        if tries[-1][0] <= _UNSEEN:
-            break
-        moved += error
-    return name, min(tries, key=lambda attempt: attempt[0])[1]
 
 
 def encode_image(

@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints, areas
 from ptmtools.light.cells import CellLight, LightBaking
 from ptmtools.light.looks import LightImage, lookup
-from ptmtools.light.model import HUE, CellSurfaces, coded_light, scale_hue
+from ptmtools.light.model import HUE, CellSurfaces, coded_light, lossy_codes, scale_hue
 from ptmtools.output.geometry import Geometry
 from ptmtools.output.pieces import pieces_of
-from ptmtools.pipeline.encoding import lossy_codes
 from ptmtools.pipeline.stages import CELLS, LIGHT, SCENE
 from ptmtools.pipeline.stages.light import QUALITY, light_baking, true_works, unlit_faces
 from ptmtools.pipeline.stages.scene import lights_of, scene_origin

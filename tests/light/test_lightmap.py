@@ -10,8 +10,8 @@ from ptmtools.arrays import Floats, fill_gaps
 from ptmtools.light.atlas import unwrap
 from ptmtools.light.lightmap import TexelGrid, vertex_light
 from ptmtools.light.looks import LightImage, PaintedLight
+from ptmtools.light.model import lossy_codes
 from ptmtools.light.occlusion import normals
-from ptmtools.pipeline.encoding import lossy_codes
 from ptmtools.scene.source import SourceWrap
 from ptmtools.texture.previews import decode_preview
 from tests.light.shapes import GROUND, indexed, triangles_of

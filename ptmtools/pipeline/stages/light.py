@@ -22,7 +22,6 @@ from ptmtools.pipeline.encoding import (
     TextureOptions,
     bake_textures,
     encode_image,
-    lossy_codes,
     ptm_file,
 )
 from ptmtools.pipeline.stage import Counts, Stage, complete
@@ -84,7 +83,7 @@ def bake_cell(
     `encode_image` returns them; none without one."""
     import numpy as np
 
-    from ptmtools.light.model import HUE, scale_hue
+    from ptmtools.light.model import HUE, lossy_codes, scale_hue
 
     cell, piece = task
     light = shared.baking.light(piece)

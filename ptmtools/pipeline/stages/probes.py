@@ -13,7 +13,6 @@ from ptmtools.pipeline.encoding import (
     TextureOptions,
     bake_textures,
     encode_image,
-    lossy_codes,
     ptm_file,
 )
 from ptmtools.pipeline.stages.cells import CELLS
@@ -49,6 +48,8 @@ def bake_probe(
 ) -> tuple[tuple[Probe, int], list[tuple[str, bytes]]]:
     """The probe of a cell, whose centre is one of some points, with the bytes of its image that are
     served, and the files of it as `encode_image` returns them."""
+    from ptmtools.light.model import lossy_codes
+
     cell, points = task
     probe = shared.baking.probe(points)
     name, data = lossy_codes(probe.texels, _QUALITY)
