@@ -42,11 +42,11 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (72_535, 350),
+    "ptmtools": (72_537, 350),
     "ptmtools/*.py": (4_170, 26),
     "ptmtools/cells": (8_924, 29),
     "ptmtools/cli": (3_110, 15),
-    "ptmtools/coverage": (2_565, 15),
+    "ptmtools/coverage": (2_567, 15),
     "ptmtools/light": (3_447, 15),
     "ptmtools/meshopt": (870, 5),
     "ptmtools/output": (7_950, 38),

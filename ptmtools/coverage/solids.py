@@ -137,15 +137,18 @@ class SampleObstacles:
         """The obstacles of a subdivided scene; ``volumes`` are those of its cells."""
         corners, rest = scene.corners, tuple(solids(scene, cells))
         nearby, slack = Nearby(corners, 0.0), scene.tolerance.noise
+        outer = np.array([bounds(body) for body in rest]).reshape(-1, 2, 3) + [[-slack], [slack]]
         tests = [
-            (points, bounds(volume.tetrahedra))
+            (points, low, high)
             for volume in volumes or CellVolume.of_cells(cells)
-            if len(points := volume.sobol(0, 4 * _TESTS, 0)[:_TESTS, :3]) == _TESTS
+            for low, high in ([] if volume.empty else [bounds(volume.tetrahedra)])
+            if ((outer[:, 0] <= low) & (high <= outer[:, 1])).all(axis=1).any()
+            and len(points := volume.sobol(0, 4 * _TESTS, 0)[:_TESTS, :3]) == _TESTS
         ]
         while True:
             obstacles = SampleObstacles(corners, nearby, rest)
             shells = set[int]()
-            for points, (low, high) in tests:
+            for points, low, high in tests:
                 owner = obstacles.solid_of(points)
                 solid = int(np.sort(owner)[_TESTS // 2])
                 if solid >= 0 and (owner == solid).mean() >= _MOST:
