@@ -34,7 +34,6 @@ from ptmtools.scene.model import Scene
 #: that an edge which one of them grazes is missed by the others; the majority counts.
 DIRECTIONS = np.array([[0.683, 0.577, 0.448], [-0.371, 0.819, -0.437], [0.291, -0.463, -0.837]])
 
-
 #: Places in a cell that tell whether it is within a solid, and the share of them inside: another
 #: solid may hold the rest.
 _TESTS, _MOST = 16, 0.75
