@@ -231,8 +231,8 @@ def _save(im: Image.Image, fp: IO[bytes], filename: str | bytes) -> None:
     given = im.encoderinfo
     if im.mode not in _SAVED:
         raise OSError(f"cannot write mode {im.mode} as PTM [PTM-I126]")
-    options = EncodeOptions(**{name: given[name] for name in _OPTIONS if name in given})
     with _pillow_errors(ValueError):
+        options = EncodeOptions(**{name: given[name] for name in _OPTIONS if name in given})
         seeks = hasattr(fp, "seekable") and fp.seekable()
         file = fp if seeks else io.BytesIO()
         encode_to(

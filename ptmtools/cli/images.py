@@ -79,11 +79,9 @@ def encode(
     IMAGE is a file, a pattern such as 'scans/*.tif', a folder (all images in it), or - for stdin.
     After an image that cannot be read, the command continues with the others.
     """
-    from ptmtools.texture.encoder import check_options
     from ptmtools.texture.images import SUFFIXES
 
     options, previews = take(EncodeOptions, values), take(FilePreviews, values)
-    check_options(options)
     if previews.wanted and output == STANDARD:
         raise InputError(
             "PTM-I111", "previews are files beside the .ptm", remedy="use -o FILE instead of -o -"

@@ -109,10 +109,8 @@ class TextureOptions(PreviewOptions, EncodeOptions):
 
     def __post_init__(self) -> None:
         """Raises InputError PTM-I111 for values out of range."""
-        from ptmtools.texture.encoder import check_options
-
-        super().__post_init__()
-        check_options(self)
+        EncodeOptions.__post_init__(self)
+        PreviewOptions.__post_init__(self)
         for name, limit in (("height", math.inf), ("fov", 180), ("distance", math.inf)):
             value = getattr(self, f"trim_{name}")
             remedy = "use a number above 0, and for an angle below 180"

@@ -14,13 +14,14 @@ import io
 import math
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import IO, Any
 
 import numpy as np
 
-from ptmtools.errors import InputError, LimitError, OutputError
+from ptmtools.errors import LimitError, OutputError
+from ptmtools.options import require
 from ptmtools.parallel import map_in_order
 from ptmtools.texture.coder import Coder, Coding, Tile
 from ptmtools.texture.container import (
@@ -33,7 +34,7 @@ from ptmtools.texture.container import (
     pack_head,
 )
 from ptmtools.texture.detail import Detail, LevelPair, compare_levels, detail_of, mean_surplus
-from ptmtools.texture.model import TILE_SIDES, Description, EncodeOptions, PtmHeader
+from ptmtools.texture.model import Description, EncodeOptions, PtmHeader
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import (
     Box,
@@ -47,56 +48,18 @@ from ptmtools.texture.samples import KINDS
 from ptmtools.texture.sources import ImageRows, RowSource, Samples
 
 
-def check_options(options: EncodeOptions) -> None:
-    """Raises InputError PTM-I111 for options that no image can be encoded with."""
-    for field in fields(options):
-        value = getattr(options, field.name)
-        if isinstance(field.default, int) and type(value) is not type(field.default):
-            raise _options_error(f"{field.name} is {value!r}", "use a whole number")
-    if options.profile not in PROFILES:
-        raise _options_error(
-            f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILES)}"
-        )
-    if options.min_side < 1 or options.max_side < 0:
-        raise _options_error(
-            "min_side or max_side is impossible",
-            "min_side must be at least 1, max_side at least 1 or 0 for no limit",
-        )
-    first, last = options.min_level, options.max_level
-    if (first < 0) == (last < 0) and first > last:
-        raise _options_error(
-            f"there are no levels {first} to {last}", "min_level must be the coarser one"
-        )
-    low, high = TILE_SIDES
-    if options.tile and not (low <= options.tile <= high and options.tile % 2 == 0):
-        raise _options_error(
-            f"tiles of {options.tile} texels are impossible",
-            f"use an even number from {low} to {high}, or 0 for none",
-        )
-    if options.max_error < 0:
-        raise _options_error("max_error is below 0", "use 0 for none")
-    if options.max_error and not PROFILES[options.profile].lossy:
-        others = " or ".join(name for name, profile in PROFILES.items() if profile.lossy)
-        raise _options_error(
-            f"profile {options.profile!r} is always exact", f"for an allowed error use {others}"
-        )
-
-
 def coder_for(options: EncodeOptions, image: ImageRows) -> Coder:
     """The coder that the options ask for. Raises InputError PTM-I111 if it cannot code the
     image."""
-    check_options(options)
     top = KINDS[image.dtype.name].top_error
-    if options.max_error > top:
-        raise _options_error(
+    require(
+        (
+            options.max_error <= top,
             f"an error of {options.max_error} cannot be allowed for {image.dtype.name} samples",
             f"use a number from 0 to {top}" if top else "use 0: floats are kept exactly",
         )
+    )
     return PROFILES[options.profile].coder
-
-
-def _options_error(what: str, remedy: str) -> InputError:
-    return InputError("PTM-I111", what, remedy=remedy)
 
 
 def kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
-from ptmtools.options import option
+from ptmtools.options import option, require
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.pyramid import Box
 from ptmtools.texture.samples import KINDS
@@ -61,6 +61,40 @@ class EncodeOptions:
         "Finest level to keep, numbered in the same way. The levels kept are numbered from 0; "
         "the file records the original size.",
     )
+
+    def __post_init__(self) -> None:
+        """Raises InputError PTM-I111 for options that no image can be encoded with."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            whole = not isinstance(field.default, int) or type(value) is type(field.default)
+            require((whole, f"{field.name} is {value!r}", "use a whole number"))
+        if self.profile not in PROFILES:
+            names = ", ".join(PROFILES)
+            require((False, f"there is no profile {self.profile!r}", f"use one of {names}"))
+        first, last, (low, high) = self.min_level, self.max_level, TILE_SIDES
+        sized = not self.tile or (low <= self.tile <= high and self.tile % 2 == 0)
+        require(
+            (
+                self.min_side >= 1 and self.max_side >= 0,
+                "min_side or max_side is impossible",
+                "min_side must be at least 1, max_side at least 1 or 0 for no limit",
+            ),
+            (
+                (first < 0) != (last < 0) or first <= last,
+                f"there are no levels {first} to {last}",
+                "min_level must be the coarser one",
+            ),
+            (
+                sized,
+                f"tiles of {self.tile} texels are impossible",
+                f"use an even number from {low} to {high}, or 0 for none",
+            ),
+            (self.max_error >= 0, "max_error is below 0", "use 0 for none"),
+        )
+        if self.max_error and not PROFILES[self.profile].lossy:
+            names = " or ".join(name for name, profile in PROFILES.items() if profile.lossy)
+            fault = f"profile {self.profile!r} is always exact"
+            require((False, fault, f"for an allowed error use {names}"))
 
 
 @dataclass(frozen=True)
