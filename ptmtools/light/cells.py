@@ -320,12 +320,6 @@ def _sizes(area: float, density: float) -> tuple[int, ...]:
     return tuple(dict.fromkeys(min(_LARGEST, side * k) for k in (1, 2, 4)))
 
 
-def round_bytes(images: int) -> int:
-    """The bytes of images, or somewhat less: a power of two, so that light stays the same if they
-    are repainted; 0 for none."""
-    return 1 << images.bit_length() - 1 if images else 0
-
-
 def expected_bytes(pieces: Sequence[CellSurfaces], density: float) -> float:
     """The bytes that lightmaps are expected to have; ``density``: texels to the metre."""
     flat = (surfaces.corner[~surfaces.dense & ~surfaces.glass] for surfaces in pieces)
@@ -334,8 +328,8 @@ def expected_bytes(pieces: Sequence[CellSurfaces], density: float) -> float:
 
 
 def affordable_density(pieces: Sequence[CellSurfaces], density: float, images: int) -> float:
-    """The texels to the metre of lightmaps beside images of a number of bytes (`round_bytes`), at
-    most ``density``; 0 if there is no surface for light, or too much of it for the options."""
+    """The texels to the metre of lightmaps beside ``images`` bytes of images, at most
+    ``density``; 0 if there is no surface for light, or too much of it for the options."""
     cost = expected_bytes(pieces, density)
     if cost < _SMALLEST * _TEXEL_BYTES:
         return 0.0

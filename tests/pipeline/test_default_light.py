@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,12 +20,11 @@ from ptmtools.light.cells import (
     TRIANGLE,
     affordable_density,
     expected_bytes,
-    round_bytes,
 )
 from ptmtools.light.model import CellSurfaces
 from ptmtools.light.options import LightOptions
 from ptmtools.pipeline.build import build_scene
-from ptmtools.pipeline.stages import LIGHT, TEXTURES
+from ptmtools.pipeline.stages import LIGHT, TEXTURES, scene
 from tests.light.glowing import write_lit_room
 from tests.systems.apo.statues import TWO_ROOMS
 
@@ -67,8 +66,15 @@ def test_lightmaps_fit_the_images() -> None:
     )
 
 
-def test_bytes_are_rounded() -> None:
-    assert [round_bytes(n) for n in (0, 1, 2, 3, 1023, 1024, 1500)] == [0, 1, 2, 2, 512, 1024, 1024]
+@pytest.mark.parametrize(
+    ("images", "rounded"),
+    [((), 0), ((1,), 1), ((1, 2), 2), ((1000, 23), 512), ((1000, 24), 1024), ((1500,), 1024)],
+)
+def test_bytes_are_rounded(
+    images: tuple[int, ...], rounded: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scene, "image_rows", lambda _: [{"bytes": size} for size in images])
+    assert scene.image_bytes(cast("Any", None)) == rounded
 
 
 def repaint(model: Path, side: int) -> int:

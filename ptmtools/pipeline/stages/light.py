@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
 _MOST = 1 << 40
-#: The input for the bytes of the images, as `round_bytes`.
+#: The input for the bytes of the images, as `image_bytes`.
 _IMAGES = "bytes of images"
 #: An input of a run that left out the lightmaps, as long as xatlas is not installed.
 _ABSENT = "xatlas"
@@ -362,9 +362,7 @@ class LightStage(Stage["Light"]):
             return {}
         lights = {} if digest is None else {name: digest}
         if options.light == "auto":
-            from ptmtools.light.cells import round_bytes
-
-            lights[_IMAGES] = sha256(str(round_bytes(image_bytes(artifacts))).encode())
+            lights[_IMAGES] = sha256(str(image_bytes(artifacts)).encode())
         before = artifacts.before(self)
         if before and _ABSENT in before.inputs and options.light == "auto" and _absence():
             lights[_ABSENT] = ""
@@ -395,7 +393,7 @@ class LightStage(Stage["Light"]):
         if options.light == "none":
             return complete(work, _NO_LIGHT, ())
         self.check_model(run, options)
-        from ptmtools.light.cells import affordable_density, round_bytes
+        from ptmtools.light.cells import affordable_density
         from ptmtools.output.geometry import Geometry
         from ptmtools.output.pieces import pieces_of
 
@@ -410,7 +408,7 @@ class LightStage(Stage["Light"]):
         geometry = Geometry(scene, cells)
         pieces = pieces_of(geometry, cells, unlit, 1 / asked, replaced)
         if options.light == "auto" and not model_light:
-            density = affordable_density(pieces, asked, round_bytes(image_bytes(run)))
+            density = affordable_density(pieces, asked, image_bytes(run))
             if not density:
                 return complete(work, _NO_LIGHT, _notes_on_size(pieces))
             options = replace(options, light_density=density)

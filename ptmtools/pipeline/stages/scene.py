@@ -70,8 +70,11 @@ def image_digests(artifacts: Artifacts) -> dict[str, str]:
 
 
 def image_bytes(artifacts: Artifacts) -> int:
-    """The bytes of the scene's images as in the model; raises as `image_rows`."""
-    return sum(row["bytes"] for row in image_rows(artifacts))
+    """The bytes of the scene's images as in the model, or somewhat less: a power of two, so that
+    what depends on them stays the same if they are repainted. 0 for none; raises as `image_rows`.
+    """
+    images = int(sum(row["bytes"] for row in image_rows(artifacts)))
+    return 1 << images.bit_length() - 1 if images else 0
 
 
 def images_of(artifacts: Artifacts) -> tuple[SourceImage, ...]:
