@@ -70,7 +70,7 @@ NAMES: dict[str, tuple[int, int]] = {
     "ptmtools": (12, 6),
     "ptmtools_systems": (3, 0),
     "ptmtools_lab": (4, 2),
-    "ptmtools_samples": (8_740, 58),
+    "ptmtools_samples": (0, 0),
 }
 #: What each package must not import.
 FORBIDDEN: dict[str, set[str]] = {
