@@ -161,16 +161,9 @@ class LightBaking:
         shown = _exposure(sample.astype(np.float64), reflectance, weight)
         white = self._white(sample, reflectance, weight, shown[0])
         shares = encode_srgb(vertex.astype(np.float64) / white)
-        return CellLight(
-            mapped,
-            lit,
-            uv,
-            np.where(dense[:, None, None], shares, np.uint8(255)),
-            white,
-            None if texels is None else light_codes(texels, white),
-            *shown,
-            *rest,
-        )
+        shares = np.where(dense[:, None, None], shares, np.uint8(255))
+        codes = None if texels is None else light_codes(texels, white)
+        return CellLight(mapped, lit, uv, shares, white, codes, *shown, *rest)
 
     def sides(self, corner: Floats, piece: CellSurfaces) -> Floats:
         """(n,) 1 where the front of (n, 3, 3) faces is lit, -1 the back."""

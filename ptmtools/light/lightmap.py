@@ -4,11 +4,11 @@ A texel has the light of its centre, also where a look-up on a face reads it but
 centre, if the surface goes on there, as in another cell; else, as on sills, that of the nearest
 point of its face. What no face reads, and what is covered, takes the nearest value.
 
-Light by rays has grain. Each of four rounds takes the plane through 25 texels of the same chart, at
-twice the distance of the round before, of which those count less that differ by more than the
-grain, as its variance tells (means would be wrong at the edges of charts, where light has a slope,
-and show as seams; Dammertz et al. 2010, Edge-Avoiding À-Trous Wavelet Transform; Schied et al.
-2017, Spatiotemporal Variance-Guided Filtering).
+Light by rays has grain. Four rounds take the plane through 25 texels of the same chart, the first
+their mean, at twice the distance of the round before, of which those count less that differ by more
+than the grain, as its variance tells (means alone would be wrong at the edges of charts, where
+light has a slope, and show as seams; Dammertz et al. 2010, Edge-Avoiding À-Trous Wavelet Transform;
+Schied et al. 2017, Spatiotemporal Variance-Guided Filtering).
 
 A lightmap belongs to the charts of one mesh. Coarse meshes carry their light at vertices: values
 whose linear interpolation is nearest to the light at many points of the faces, in the least squares
@@ -31,17 +31,17 @@ from ptmtools.light.looks import SMALLEST, Look
 from ptmtools.light.occlusion import SPREAD, hemisphere, turns
 from ptmtools.tolerance import INWARD_SHARE, TIE_SHARE
 
-#: Distances of the texels of each round, and by how many deviations their light differs.
-_STEPS, _APART = (1, 2, 4, 8), 3.0
+#: The distance of the texels of each round, and the variance of their places along an axis,
+#: texels², below which values lie in no plane.
+_ROUNDS = ((1, math.inf), (2, 0.05), (4, 0.05), (8, 0.05))
+#: By how many deviations the light of texels differs that do not count.
+_APART = 3.0
 #: Texels by which what is open grows into what is covered: beyond, the light of other rooms counts.
 _GROWN = 2
 #: Texels from a face to the centre of a texel that it reads, at most.
 _BEYOND = 2.0
-#: Variance of places along an axis, texels², below which values around a texel lie in no plane.
-_STIFF = 0.05
-#: (25, 3) 1 and the steps to the texels of a round, and (25,) their weights.
-_TAPS = np.array([(1, i, j) for i in range(-2, 3) for j in range(-2, 3)])
-_SPLINE = np.array([3 / 8, 1 / 4, 1 / 16])[abs(_TAPS[:, 1:])].prod(axis=1)
+#: Weights of the texels of a round along an axis, by their distance.
+_SPLINE = (3 / 8, 1 / 4, 1 / 16)
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,8 @@ class TexelGrid:
         grain = np.zeros(chart.shape, np.float32)
         value[self.row, self.column] = np.where(covered[:, None], 0, light)
         grain[self.row, self.column] = np.where(covered, 0, variance)
-        for step in _STEPS:
-            value, grain = smooth(
-                value, blur(grain, chart), chart, step, least, _STIFF, _TAPS, _SPLINE
-            )
+        for step, stiff in _ROUNDS:
+            value, grain = smooth(value, blur(grain, chart), chart, step, least, stiff)
         return np.where(covered[:, None], np.nan, value[self.row, self.column])
 
     def is_in_chart_of(self, chosen: Bools) -> Bools:
@@ -189,42 +187,55 @@ def smooth(
     step: int,
     least: float,
     stiff: float,
-    taps: Ints,
-    spline: Floats,
 ) -> tuple[Singles, Singles]:
     """One round: (h, w, k) ``value`` and its (h, w) ``variance`` after it; see `TexelGrid.smooth`
-    and `_TAPS`."""
+    and `_ROUNDS`."""
     height, width, channels = value.shape
-    result, rest, mean = np.zeros_like(value), np.zeros_like(variance), value.sum(axis=2) / channels
-    share, moment = np.empty(len(taps)), np.empty((3, 3))
+    result, rest = np.zeros_like(value), np.zeros_like(variance)
+    mean = np.zeros_like(variance)
+    for k in range(channels):
+        mean += value[:, :, k]
+    share = np.empty(25)
     for row in range(height):
         for column in range(width):
             number = chart[row, column]
             if number < 0:
                 continue
             centre = mean[row, column]
-            sharp = 1 / (_APART * np.sqrt(variance[row, column]) + least)
-            moment[:] = 0
-            for k in range(len(taps)):
-                r, c = row + step * taps[k, 1], column + step * taps[k, 2]
-                share[k] = 0
-                if 0 <= r < height and 0 <= c < width and chart[r, c] == number:
-                    share[k] = spline[k] * np.exp(-abs(centre - mean[r, c]) * sharp)
-                    for a in range(3):
-                        for b in range(3):
-                            moment[a, b] += share[k] * taps[k, a] * taps[k, b]
+            sharp = 1 / (16 * channels * (_APART * np.sqrt(variance[row, column]) + least))
+            total, x, y, xx, xy, yy, k = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
+            for i in range(-2, 3):
+                for j in range(-2, 3):
+                    r, c, part = row + step * i, column + step * j, 0.0
+                    if 0 <= r < height and 0 <= c < width and chart[r, c] == number:
+                        # (1 - x / 16) ** 16, nearly exp(-x), in half the time.
+                        part = max(1 - abs(centre - mean[r, c]) * sharp, 0.0)
+                        part *= part
+                        part *= part
+                        part *= part
+                        part *= part * _SPLINE[abs(i)] * _SPLINE[abs(j)]
+                        total += part
+                        x += part * i
+                        y += part * j
+                        xx += part * i * i
+                        xy += part * i * j
+                        yy += part * j * j
+                    share[k] = part
+                    k += 1
             # The first row of the inverse: weights of values for that of their plane here.
-            rows = moment[1, 1] + stiff * moment[0, 0]
-            columns = moment[2, 2] + stiff * moment[0, 0]
-            first = rows * columns - moment[1, 2] ** 2
-            second = moment[1, 2] * moment[0, 2] - moment[0, 1] * columns
-            third = moment[0, 1] * moment[1, 2] - rows * moment[0, 2]
-            whole = moment[0, 0] * first + moment[0, 1] * second + moment[0, 2] * third
-            for k in range(len(taps)):
+            first, second, third, whole = 1.0, 0.0, 0.0, total
+            if stiff < np.inf:
+                xx += stiff * total
+                yy += stiff * total
+                first = xx * yy - xy * xy
+                second = xy * y - x * yy
+                third = x * xy - xx * y
+                whole = total * first + x * second + y * third
+            for k in range(25):
                 if share[k] > 0:
-                    r, c = row + step * taps[k, 1], column + step * taps[k, 2]
-                    part = share[k] / whole
-                    part *= first + second * taps[k, 1] + third * taps[k, 2]
+                    i, j = k // 5 - 2, k % 5 - 2
+                    r, c = row + step * i, column + step * j
+                    part = share[k] / whole * (first + second * i + third * j)
                     rest[row, column] += part * part * variance[r, c]
                     for a in range(channels):
                         result[row, column, a] += part * value[r, c, a]
@@ -261,7 +272,7 @@ POINTS = 8
 SMOOTH = 0.8
 #: Weight of the mean of a vertex's own points, beside the fit; rounds of conjugate gradients.
 _STEADY = 0.01
-_ROUNDS = 24
+_GRADIENTS = 24
 
 
 def vertex_light(look: Look, corner: Floats, normal: Floats) -> Floats:
@@ -347,7 +358,7 @@ def _fit(vertex: Ints, share: Floats, seen: Floats, area: Floats) -> Floats:
     rest = target - times(value)
     way = rest / mass
     size = float(rest @ way)
-    for _ in range(_ROUNDS):
+    for _ in range(_GRADIENTS):
         if size <= 0:
             break
         moved = times(way)

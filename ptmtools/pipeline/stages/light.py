@@ -344,8 +344,8 @@ class LightStage(Stage["Light"]):
 
     name = "light"
     about = "Bake the light of the surfaces into lightmaps."
-    recipe = 16
-    changed = "the light of walls in two cells has smaller seams"
+    recipe = 17
+    changed = "the light of walls has less grain in corners"
     options = LightOptions
     heeds = (TEXTURES,)
     artifact = Lazy("ptmtools.light.model:Light")
