@@ -21,7 +21,7 @@ from ptmtools.scene.model import Material
 from ptmtools.scene.normal_maps import NormalMaps
 from ptmtools.scene.notes import IngestNotes
 from ptmtools.scene.source import ModelSource, SourceMaterial, SourceTexture
-from ptmtools.scene.texels import uses_holes
+from ptmtools.scene.texels import near_holes, uses_holes
 
 #: Default colours: of faces without an image, and of images.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
@@ -35,7 +35,8 @@ class SceneMaterials:
 
     Attributes
     ----------
-    used: (M,) int64 the number of each material in the source, increasing.
+    used: (M,) int64 the number of each material in the source: increasing, then once more those of
+        which a part of the faces uses opaque texels only.
     """
 
     used: Ints
@@ -71,7 +72,7 @@ def gather_materials(
     images = OptionalImages(store, notes)
     maps = (m for o in originals for m in (o.metallic_map, o.roughness_map, o.gloss_map) if m)
     images.read_all(maps, mean_values, workers)
-    materials = []
+    materials, parts = [], {}
     for done, (material, rows) in enumerate(zip(baked, faces, strict=True)):
         progress(done, len(faces), "materials")
         if colors is not None and (colors[rows] != 255).any():
@@ -79,14 +80,20 @@ def gather_materials(
             colors[rows] = np.rint(colors[rows] * tint).astype(np.uint8)
             material = replace(material, color=WHITE)
         metallic, roughness = _matter(material, images)
-        emitted = _material(material, uv[rows], store, notes)
+        emitted, opaque = _material(material, uv[rows], store, notes)
         materials.append(replace(emitted, metallic=metallic, roughness=roughness))
+        if len(opaque):
+            parts[done] = rows[opaque]
     normal_maps = NormalMaps(store, notes)
     for number, rows in enumerate(faces):
         if (normal := originals[number].normal) is not None:
             moved = uv is not written and not np.array_equal(uv[rows], written[rows])
             image = normal_maps.add(normal, baked[number].texture, moved=moved)
             materials[number] = replace(materials[number], normal=image)
+    for number, rows in parts.items():
+        triangle_material[rows] = len(materials)
+        materials.append(replace(materials[number], transparent=False, cutoff=None))
+    used = np.append(used, used[list(parts)])
     normal_uv = _normal_coordinates(source, kept, materials, triangle_material, written)
     progress(len(faces), len(faces), "materials")
     return SceneMaterials(used, tuple(materials), triangle_material, uv, colors, normal_uv)
@@ -167,18 +174,21 @@ def _matter(material: SourceMaterial, images: OptionalImages) -> tuple[float, fl
 
 def _material(
     material: SourceMaterial, uv: Floats, store: ImageStore, notes: IngestNotes
-) -> Material:
-    """The emitted form of a material whose kept faces have these (n, 3, 2) coordinates."""
-    texture, image = material.texture, -1
+) -> tuple[Material, Ints]:
+    """The emitted form of a material whose kept faces have these (n, 3, 2) coordinates; of those,
+    if only others use transparent texels, the numbers of the opaque ones."""
+    texture, image, opaque = material.texture, -1, np.zeros(0, np.int64)
     wraps = emitted_wraps(texture)
     transparent = material.see_through or material.opacity < 1
     if texture is not None and (added := store.add(texture)) is not None:
         image, holes = added
         if holes is not None and not (transparent or material.ignores_alpha):
-            transparent = uses_holes(holes, uv, *wraps)
+            through = near_holes(holes, uv, *wraps)
+            transparent = uses_holes(holes, uv[through], *wraps)
+            opaque = np.flatnonzero(~through) if transparent else opaque
     if material.opacity == 0:
         notes.note("PTM-N211", f"material {material.name}: invisible (opacity 0)")
-    return Material(
+    emitted = Material(
         name=material.name,
         color=material.color or (PLAIN if image < 0 else WHITE),
         opacity=material.opacity,
@@ -188,3 +198,4 @@ def _material(
         transparent=transparent,
         cutoff=material.cutoff if image >= 0 else None,
     )
+    return emitted, opaque

@@ -20,8 +20,20 @@ from ptmtools.scene.model import Wrap
 
 #: A triangle over more repetitions of the image than this is assumed to use every texel.
 _MANY_TILES = 16
+#: Texels by which a box is smaller, against rounding.
+_INSET = 1e-3
 #: Widening of a run against rounding, relative to a texel or its distance from the origin.
 _SLACK = 1e-9
+
+
+def near_holes(holes: Bools, uv: Floats, wrap_s: Wrap, wrap_t: Wrap) -> Bools:
+    """(T,) whether the box of each triangle has a texel that is not opaque. What filtering spreads
+    from beside the box, as from the next tile of an atlas, does not count. See `uses_holes`."""
+    _, box, tiles, _ = _boxes(holes, uv, (wrap_s, wrap_t), -_INSET)
+    box[:, 2:] = np.maximum(box[:, 2:], box[:, :2] + 1)
+    result = tiles > _MANY_TILES
+    result[~result] = _holes_in(_table(holes), box[~result].astype(np.int64)) > 0
+    return result
 
 
 def uses_holes(holes: Bools, uv: Floats, wrap_s: Wrap, wrap_t: Wrap) -> bool:
@@ -37,47 +49,49 @@ def uses_holes(holes: Bools, uv: Floats, wrap_s: Wrap, wrap_t: Wrap) -> bool:
         return False
     if holes.all():
         return True
-    height, width = holes.shape
-    wraps: tuple[Wrap, Wrap] = (wrap_s, wrap_t)
-    with np.errstate(over="ignore"):
-        texel = np.stack([uv[..., 0] * width, (1.0 - uv[..., 1]) * height], axis=2)
-    if not np.isfinite(texel).all():
-        return True
     # Texel i spreads over the open interval (i - 0.5, i + 1.5).
-    low = np.floor(texel.min(axis=1) - 0.5)
-    high = np.ceil(texel.max(axis=1) + 0.5)
-    span = (high - low) / [width, height]
-    # Beyond a clamped edge a triangle smears; its box is used instead.
-    smeared = np.zeros(len(uv), dtype=bool)
-    for axis, size in enumerate((width, height)):
-        if wraps[axis] == "clamp":
-            smeared |= (texel[..., axis].min(axis=1) < 0) | (texel[..., axis].max(axis=1) > size)
-            low[:, axis] = np.clip(low[:, axis], 0, size - 1)
-            high[:, axis] = np.clip(high[:, axis], 1, size)
-            span[:, axis] = np.minimum(span[:, axis], 1.0)
-        else:  # shifted by whole repetitions, so that the numbers are small and exact
-            shift = np.floor(low[:, axis] / size) * size
-            low[:, axis] -= shift
-            high[:, axis] -= shift
-            texel[..., axis] -= shift[:, None]
-    if (span.prod(axis=1) > _MANY_TILES).any():
+    texel, box, tiles, smeared = _boxes(holes, uv, (wrap_s, wrap_t), 0.5)
+    if not np.isfinite(texel).all() or (tiles > _MANY_TILES).any():
         return True
-
-    box = np.concatenate([low, high], axis=1).astype(np.int64)
-    table = _table(holes)
-    inside = np.zeros(len(box), dtype=np.int64)
-    for sign_x, x in ((-1, box[:, 0]), (1, box[:, 2])):
-        for sign_y, y in ((-1, box[:, 1]), (1, box[:, 3])):
-            inside += sign_x * sign_y * _count_holes(table, x, y)
+    table, whole = _table(holes), box.astype(np.int64)
+    inside = _holes_in(table, whole)
+    # Beyond a clamped edge a triangle smears; its box is used instead.
     if (smeared & (inside > 0)).any():
         return True
     candidates = np.flatnonzero(inside)
     # The smallest first, which are the cheapest to test.
-    spans = (box[:, 2] - box[:, 0]) * (box[:, 3] - box[:, 1])
+    spans = (whole[:, 2] - whole[:, 0]) * (whole[:, 3] - whole[:, 1])
     return any(
-        _touches(table, texel[t], box[t])
+        _touches(table, texel[t], whole[t])
         for t in candidates[np.argsort(spans[candidates], kind="stable")]
     )
+
+
+def _boxes(
+    holes: Bools, uv: Floats, wraps: tuple[Wrap, Wrap], spread: float
+) -> tuple[Floats, Floats, Floats, Bools]:
+    """(T, 3, 2) triangles in texels from the top, (T, 4) the whole texels that their boxes, larger
+    by a ``spread``, have: low x and y, high x and y, (T,) the repetitions of the image in these,
+    and whether triangles reach beyond a clamped edge. Moved by whole repetitions, so that the
+    numbers are small and exact."""
+    height, width = holes.shape
+    with np.errstate(over="ignore", invalid="ignore"):
+        texel = np.stack([uv[..., 0] * width, (1.0 - uv[..., 1]) * height], axis=2)
+        low, high = texel.min(axis=1), texel.max(axis=1)
+        box = np.concatenate([np.floor(low - spread), np.ceil(high + spread)], axis=1)
+        span = (box[:, 2:] - box[:, :2]) / [width, height]
+        smeared = np.zeros(len(uv), dtype=bool)
+        for axis, size in enumerate((width, height)):
+            if wraps[axis] == "clamp":
+                smeared |= (low[:, axis] < 0) | (high[:, axis] > size)
+                box[:, axis] = np.clip(box[:, axis], 0, size - 1)
+                box[:, axis + 2] = np.clip(box[:, axis + 2], 1, size)
+                span[:, axis] = np.minimum(span[:, axis], 1.0)
+            else:
+                shift = np.floor(box[:, axis] / size) * size
+                box[:, [axis, axis + 2]] -= shift[:, None]
+                texel[..., axis] -= shift[:, None]
+    return texel, box, span.prod(axis=1), smeared
 
 
 def _table(holes: Bools) -> NDArray[np.uint32]:
@@ -88,6 +102,15 @@ def _table(holes: Bools) -> NDArray[np.uint32]:
     np.cumsum(inner, axis=0, out=inner)
     np.cumsum(inner, axis=1, out=inner)
     return table
+
+
+def _holes_in(table: NDArray[np.uint32], box: Ints) -> Ints:
+    """(n,) holes in (n, 4) boxes of the plane tiled with the image: low x and y, high x and y."""
+    inside = np.zeros(len(box), dtype=np.int64)
+    for sign_x, x in ((-1, box[:, 0]), (1, box[:, 2])):
+        for sign_y, y in ((-1, box[:, 1]), (1, box[:, 3])):
+            inside += sign_x * sign_y * _count_holes(table, x, y)
+    return inside
 
 
 def _count_holes(table: NDArray[np.uint32], x: Ints, y: Ints) -> Ints:

@@ -110,7 +110,8 @@ def test_materials(put: Put, side: bool) -> None:
     [
         ({}, False),
         ({"alphaMode": "OPAQUE"}, False),
-        ({"alphaMode": "MASK"}, True),
+        ({"alphaMode": "MASK"}, False),
+        ({"alphaMode": "BLEND"}, False),
         ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}, True),
         ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0}}}, False),
     ],
@@ -185,9 +186,30 @@ def test_an_image_stays_one_where_opaque_materials_use_opaque_texels(put: Put) -
     coords = [(0, 0.9), (1, 0.9), (1, 0.7), (0, 0.7)]
     doc = with_modes(GltfModel(), pixels, "OPAQUE", "BLEND", coords=coords)
     scene = ingest(put("a.glb", doc.glb()))
-    assert [m.transparent for m in scene.materials] == [False, True]
+    assert [m.transparent for m in scene.materials] == [False, False]
     assert [m.image for m in scene.materials] == [0, 0]
     assert scene.images[0].load() == png(pixels)
+
+
+def test_only_faces_that_use_transparent_texels_are_transparent(put: Put) -> None:
+    """One tile of glass in the atlas of a building does not make its walls transparent."""
+    pixels = noise(1, bands=4)
+    pixels[..., 3] = 255
+    pixels[:4, :4, 3] = 99  # the upper left tile
+    tiles = [[(0, y), (0.5, y), (0.5, y + 0.5), (0, y + 0.5)] for y in (0.5, 0)]
+    base = GltfModel()
+    material = {**with_image(base, png(pixels)), "alphaMode": "BLEND", "name": "atlas"}
+    base.tree["materials"] = [material, {"name": "plain"}]
+    for place, tile in enumerate(tiles):
+        quad = base.quad(material=0)
+        quad["attributes"]["TEXCOORD_0"] = base.add(np.array(tile, np.float32))
+        base.place(quad, translation=[0, 0, 5 * place])
+    base.place(base.quad(material=1), translation=[0, 0, 20])
+    scene = ingest(put("a.glb", base.glb()))
+    assert [m.name for m in scene.materials] == ["atlas", "plain", "atlas"]
+    assert [m.transparent for m in scene.materials] == [True, False, False]
+    assert len(scene.images) == 1
+    assert scene.opaque.tolist() == [True, True, False, False, True, True]
 
 
 def test_what_transmits_light_ignores_alpha_too(put: Put) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.scene.texels import uses_holes
+from ptmtools.scene.texels import near_holes, uses_holes
 
 
 def sampled(holes: np.ndarray, uv: np.ndarray, wrap: tuple[str, str]) -> bool:
@@ -93,3 +93,16 @@ def test_a_point_uses_the_texels_around_it() -> None:
     holes[7, 0] = True
     assert uses_holes(holes, np.zeros((1, 3, 2)), "repeat", "repeat")
     assert not uses_holes(holes, np.full((1, 3, 2), 0.5), "repeat", "repeat")
+
+
+def test_boxes_near_holes() -> None:
+    """What filtering spreads from the next tile of an atlas does not count."""
+    holes = np.zeros((8, 8), dtype=bool)
+    holes[:4, 4:] = True  # the upper right tile
+    tile = np.array([[[0.0, 0.0], [0.5, 0.0], [0.5, 0.5]]])
+    tiles = np.concatenate([tile, tile + [0.5, 0.0], tile + [0.0, 0.5], tile + [0.5, 0.5]])
+    assert near_holes(holes, tiles, "repeat", "repeat").tolist() == [False, False, False, True]
+    assert near_holes(holes, tiles - 3.0, "repeat", "repeat").tolist() == [False] * 3 + [True]
+    beyond = tiles + [0.5, 0.0]
+    assert near_holes(holes, beyond, "repeat", "clamp").tolist() == [False, False, True, False]
+    assert near_holes(holes, beyond, "clamp", "clamp").tolist() == [False, False, True, True]

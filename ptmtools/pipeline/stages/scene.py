@@ -220,8 +220,8 @@ class SceneStage(Stage["Scene"]):
 
     name = "scene"
     about = "Read a model."
-    recipe = 19
-    changed = "soft alpha with a cutoff becomes steps"
+    recipe = 20
+    changed = "only faces that use transparent texels are transparent"
     options = IngestOptions
     artifact = Lazy("ptmtools.scene.model:Scene")
     joined = True

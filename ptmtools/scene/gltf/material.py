@@ -55,7 +55,7 @@ class MaterialUse:
     index: into `GltfMaterialReader.materials`.
     coords: the attribute with its texture coordinates.
     matrix: (2, 3) KHR_texture_transform, origin at the upper left as in glTF.
-    see_through: whether its alpha mode is not opaque.
+    see_through: whether an alpha of vertices counts, or it transmits light.
     light: (3,) its base colour, linear light, the factor of vertex colours.
     normal_coords, normal_matrix: those of its normal map, if they are not those above; or None.
     optional: whether it can be drawn without its texture.
@@ -117,8 +117,9 @@ class GltfMaterialReader:
             self._notes.note("PTM-N215", "colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
-        see_through = entry.get("alphaMode") in ("MASK", "BLEND")
         alpha = _alpha(entry, a)
+        # Of images, the texels tell.
+        see_through = colored and not alpha["ignores_alpha"]
         transmission, transmits = extensions.get("KHR_materials_transmission", {}), 0.0
         if transmission.get("transmissionFactor", 0) > 0:
             self._notes.note("PTM-N215", "transmits light, never occludes", place)
