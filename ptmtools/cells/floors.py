@@ -138,6 +138,8 @@ _STOREY = 0.5
 _LOWER = 0.02
 #: and at least this one ends at most so far above it, metres: else nothing is a room's height.
 _ALIKE, _SPREAD = 0.25, 0.5
+#: This share of the floor with ceilings may lie above it.
+_ABOVE = 0.1
 #: A wall leans by less than this (sine).
 _LEANS = 0.02
 
@@ -190,7 +192,8 @@ def _parts_in(corners: Floats, low: Floats, high: Floats) -> Floats:
 
 def ceiling_height(floor: SampledFloor, walls: list[WallPlane], walker: Walker) -> float | None:
     """The height, metres in world coordinates, at which rooms of a building end whose storey with
-    most open floor is mostly open, with those above; None where walls have no common height."""
+    most open floor is mostly open, with those above; None where walls have no common height, or if
+    it would cut through storeys with ceilings, as those of a house in a garden."""
     storey = np.floor(floor.height / _STOREY)
     names, number = np.unique(storey[~floor.covered], return_counts=True)
     main = names[number.argmax()] if len(names) else np.inf
@@ -203,7 +206,9 @@ def ceiling_height(floor: SampledFloor, walls: list[WallPlane], walker: Walker) 
     lower = np.cumsum(length) - length
     height = top[np.flatnonzero(lower <= _LOWER * length.sum())[-1]]
     alike = (top >= height) & (top <= height + _SPREAD)
-    return float(height) if length[alike].sum() >= _ALIKE * length.sum() else None
+    common = length[alike].sum() >= _ALIKE * length.sum()
+    above = floor.covered & (floor.height > height)
+    return float(height) if common and above.sum() <= _ABOVE * floor.covered.sum() else None
 
 
 def _tops(walls: list[WallPlane], eyes: float) -> tuple[Floats, Floats]:

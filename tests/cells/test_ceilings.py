@@ -17,7 +17,7 @@ from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.orientation.space import to_world
 from ptmtools.visibility import check_conservative, compute_pvs
-from tests.cells.buildings import write
+from tests.cells.buildings import carved, room, write
 from tests.cells.strangers import Parts, office, serpentine
 from tests.scene.buildings import box, house, meadow, sheet
 
@@ -203,6 +203,22 @@ def test_a_storey_without_a_ceiling_has_one_over_others_that_have(tmp_path: Path
     a, b = cells.locate(middles(scene, [(4.3, 6, 4.6), (12.6, 6, 4.6)])).tolist()
     assert a != b
     assert any("open at the top" in note for note in cells.notes)
+
+
+def test_a_house_in_a_garden_keeps_its_storeys(tmp_path: Path) -> None:
+    """Most of what lies among walls, a fence, is open, but rooms above them have ceilings."""
+    rooms = [room(x, 0, x + 4, 5, z, z + 2.8) for z in (0, 3) for x in (0, 4.2)]
+    holes = [((4, 2, z), (4.2, 3, z + 2.1)) for z in (0, 3)] + [((1, -0.2, 0), (2, 0, 2.1))]
+    walls = [((-16, y), (24, y + 0.1)) for y in (-16, 20.9)]
+    walls += [((x, -16), (x + 0.1, 21)) for x in (-16, 23.9)]
+    fence = [box((*low, -0.2), (*high, 1.6)) for low, high in walls]
+    parts = {"house": carved(rooms, holes), "fence": np.concatenate(fence)}
+    parts["garden"] = box((-16, -16, -0.5), (24, 21, -0.2))
+    scene = scene_of_parts(parts, tmp_path)
+    cells = subdivide(scene)
+    assert cells.ceiling is None
+    places = [(x, 2.5, z + 1.0) for z in (0, 3) for x in (2, 6)]
+    assert len(set(cells.locate(middles(scene, places)).tolist())) == 4
 
 
 def test_an_unknown_ceiling_is_an_error() -> None:

@@ -19,8 +19,8 @@ class CellsStage(Stage["Cells"]):
 
     name = "cells"
     about = "Read a model and divide its space into cells and portals."
-    recipe = 12
-    changed = "the edges of walkable floors differ by rounding"
+    recipe = 13
+    changed = "a garden takes no storeys from its house"
     options = SubdivideOptions
     reads = (SCENE,)
     artifact = Lazy("ptmtools.cells.model:Cells")
