@@ -26,7 +26,7 @@ from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.cells.doors import Enclosure
-    from ptmtools.scene.inspection import Guess, Inspection
+    from ptmtools.scene.inspection import Inspection
     from ptmtools.scene.model import Scene
 
 #: Shown for a stage whose record has another recipe.
@@ -221,7 +221,7 @@ def _info_model(console: Console, target: str, options: IngestOptions) -> None:
 def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tuple[str, str]]:
     """The headings and texts of the description of a model; with ``every`` object, image, door and
     note."""
-    from ptmtools.scene.notes import lines, warnings
+    from ptmtools.scene.notes import GUESSES, lines, warnings
 
     def some(names: list[str]) -> str:
         shown = names if every else names[:_SHOWN]
@@ -242,10 +242,6 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
     yield "size", f"{width:.3g} x {depth:.3g} m, {height:.3g} m high"
     yield "unit", f"{space.metres:g} m ({'guessed' if space.unit_guessed else 'given'})"
     yield "up axis", f"{space.up.upper()} ({'guessed' if space.up_guessed else 'given'})"
-    yield "best guess", _guess(model.best)
-    for place, guess in enumerate(model.others):
-        if place == 0 or guess.rival:
-            yield "alternative", _guess(guess)
     yield "closed", _closed_text(around)
     names = f": {some(list(around.doors))}" if around.doors else ""
     yield "doors", f"{len(around.doors)} recognised{names}"
@@ -255,8 +251,9 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
         yield "rooms", f"{len(scene.rooms)}: {some([r.name or 'unnamed' for r in scene.rooms])}"
     for warning in warnings(scene.notes):
         yield "warning", warning
-    for note in lines(scene.notes) if every else ():
-        yield "note", note
+    shown = (note for note in scene.notes if every or note.code in GUESSES)
+    for text in lines(shown):
+        yield "note", text
 
 
 def _size(scene: Scene) -> list[float]:
@@ -284,11 +281,6 @@ def _images(model: Inspection) -> str:
     return f"{files}; {size(total)}, {texels:,} texels"
 
 
-def _guess(guess: Guess) -> str:
-    why = f" (reasons: {', '.join(guess.reasons)})" if guess.reasons else ""
-    return f"unit {guess.unit}, {guess.up.upper()} up: {guess.size}{why}"
-
-
 def _closed_text(around: Enclosure) -> str:
     if not around.rooms:
         return "unknown: no place has a roof above and walls around it"
@@ -314,7 +306,6 @@ def _record(model: Inspection, around: Enclosure) -> dict[str, Any]:
         "images": [asdict(image) for image in model.images],
         "space": vars(scene.space),
         "size": _size(scene),
-        "looks": [asdict(guess) for guess in (model.best, *model.others)],
         "enclosure": asdict(around) | {"closed": around.looks_closed},
         "storeys": [vars(storey) for storey in scene.storeys],
         "rooms": [room.name for room in scene.rooms],

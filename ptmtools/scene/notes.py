@@ -39,8 +39,10 @@ WARNINGS = (
 )
 #: Warnings of which each is printed: what was converted differs from image to image.
 EACH = ("PTM-N126",)
-#: The second best up axis: not a warning, but printed without ``-v``.
+#: The second best up axis: not a warning, but a build prints it without ``-v``.
 RUNNER_UP = "PTM-N238"
+#: What a description of a model prints without ``-v``.
+GUESSES = ("PTM-N201", "PTM-N202", RUNNER_UP)
 #: Inside out, and rooms of impossible size: irrelevant for models that are viewed from outside,
 #: such as statues and campus buildings, whose faces are turned away from the rooms.
 OF_ROOMS = ("PTM-N235", "PTM-N236")

@@ -55,8 +55,8 @@ def test_what_is_said(put: Put, capsys: pytest.CaptureFixture[str]) -> None:
     assert rows["size"] == "8 x 4 m, 2.6 m high"
     assert rows["unit"] == "1 m (guessed)"
     assert rows["up axis"] == "Y (guessed)"
-    assert rows["best guess"].startswith("unit m, Y up: 8 m wide and 2.6 m high, ")
-    assert rows["alternative"].split(",")[0].removeprefix("unit ") in ("cm", "mm", "in", "ft", "m")
+    assert "note        up axis guessed: Y, 8 m wide and 2.6 m high, " in text
+    assert "note        unit guessed: m (8 m wide and 2.6 m high, " in text
     assert rows["closed"] == "probably; no sight line from a room leaves the building"
     assert rows["doors"] == "1 recognised: Door_12"
 
@@ -121,6 +121,7 @@ def test_options_count_as_in_a_build(put: Put, capsys: pytest.CaptureFixture[str
     actual = record(put("house.obj", rooms()), capsys, "--unit", "ft", "--up", "z")
     assert (actual["space"]["metres"], actual["space"]["up"]) == (0.3048, "z")
     assert np.allclose(actual["size"], [8 * 0.3048, 4 * 0.3048, 2.6 * 0.3048])
+    assert "guessed" not in info(put("house.obj", rooms()), capsys, "--unit", "m", "--up", "y")
 
 
 @pytest.mark.parametrize("name", ["gone.obj", "a.glb"])

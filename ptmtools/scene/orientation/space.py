@@ -212,6 +212,8 @@ def _judge_axis(ranked: list[Candidate], by_format: Up | None, notes: IngestNote
             f"up axis guessed: {best.up.upper()}, {best.size}{for_best}; use --up to override",
         )
         if rival.rivals(best):
+            # In the unit that will be guessed.
+            rival = next((c for c in ranked if c.up == rival.up and c.unit in UNITS), rival)
             unit = f", unit {rival.unit}" if rival.unit != best.unit else ""
             notes.note(
                 "PTM-N238",
