@@ -359,9 +359,6 @@ class PlotOptions:
     height: float = option(
         1.2, "Height of the horizontal cut above the floor of each storey.", metavar="METRES"
     )
-    storey_gap: float = option(
-        1.5, "Minimum vertical distance between the floors of two storeys.", metavar="METRES"
-    )
     width: float = option(12.0, "Width of the picture.", metavar="INCHES")
     dpi: int = option(110, "Resolution, in dots per inch.")
 

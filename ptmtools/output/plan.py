@@ -20,7 +20,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import write_bytes
 from ptmtools.lazy import component
-from ptmtools.output.model import PlotOptions, PlotReport, storey_name
+from ptmtools.output.model import PlotOptions, PlotReport
 from ptmtools.output.plan_marks import (
     LEAK,
     draw_leaks,
@@ -34,6 +34,7 @@ from ptmtools.output.storeys import (
     cut_height,
     leaf_section,
     polygon_section,
+    storey_names,
     storey_of,
     storeys,
     triangle_section,
@@ -145,7 +146,7 @@ def plot_plan(
         raise DatabaseError(
             "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
         )
-    floors = storeys(cells, options.height, options.storey_gap)
+    floors = storeys(scene, cells, options.height)
     figure = _Plan(scene, cells, pvs, ach, options, floors, way).draw(agg.FigureCanvasAgg)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None}, facecolor=_PAPER)
@@ -209,14 +210,14 @@ class _Plan:
         height = head + rows * (_CAPTION + tall + _FOOT) + _MARGIN
         figure.set_size_inches(width, height)
         shades = ScalarMappable(LogNorm(_FAINTEST, 1), _SHADES)
-        for i, floor in enumerate(self._floors):
+        for i, name in enumerate(storey_names(self._scene, self._floors)):
             row, column = divmod(i, columns)
             edge = _MARGIN + column * (panel + _GAP)
             bottom = height - head - (row + 1) * (_CAPTION + tall + _FOOT) + _FOOT
             axis = figure.add_axes((edge / width, bottom / height, panel / width, tall / height))
             axis.set_axis_off()
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
-            self._storey(axis, floor, shades, panel)
+            self._storey(axis, name, self._floors[i], shades, panel)
             draw_left_out(axis, self._cells, self._floors, i, self._to_paper)
             draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._to_paper)
             if self._way is not None:
@@ -232,7 +233,7 @@ class _Plan:
         """(…, 2) plan coordinates (x, z) as (right, down) on paper."""
         return np.stack([plan[..., 1], -plan[..., 0]], axis=-1) if self._turned else plan
 
-    def _storey(self, axis: Any, floor: float, shades: Any, panel: float) -> None:
+    def _storey(self, axis: Any, name: str, floor: float, shades: Any, panel: float) -> None:
         from matplotlib.collections import LineCollection, PolyCollection
 
         height = cut_height(self._cells, floor, self._options.height)
@@ -260,7 +261,6 @@ class _Plan:
         self._numbers(axis, sections, 72 * panel / float(self._high[0] - self._low[0]))
         self._scale_bar(axis)
         numbers = len({cell for cell, _ in sections})
-        name = storey_name(self._scene, floor, self._options.storey_gap)
         axis.set_title(
             f"{name}{': ' if name else ''}floor {floor:+.2f} m, cut at {height:+.2f} m: "
             f"{count(numbers, 'cell')}",

@@ -1,9 +1,12 @@
 """The storeys of a building, and horizontal sections of triangles, polygons and leaves.
 
-A storey's floor is a cluster of the leaves' lowest heights, weighted by the area of the leaves:
-heights within a storey gap of one another belong together, the lowest of a cluster first. Hanging
-leaves (the space over a cupboard, a lintel's slab) begin between the storeys and form none; every
-storey shows all the leaves that its section cuts. Floor that is in no cell counts too.
+Storeys follow from the floor of leaves that are mostly under a ceiling: not from roofs, terrain or
+furniture. The range of heights with most of that floor is a storey; so is the one with most of the
+rest, until little is left, such as landings. Storeys that the model names come first. A range is
+as high as the section is above a floor, so that the section cuts all its rooms; a storey's floor is
+the median of its range. Floor that is in no cell counts too. A building without ceilings has one
+storey, since the floor of a second one would be a ceiling of the first. Tried and rejected: the
+lowest heights of leaves, some of which begin on car roofs, over doors and on roofs.
 
 Plan coordinates are (x, z). A corner in the cutting plane counts as above it, so a section through
 a floor's own height is that of the walls that stand on it, and no corner is met twice.
@@ -15,8 +18,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, normals
 from ptmtools.cells.model import Cells
+from ptmtools.cells.structure import Surroundings
+from ptmtools.output.model import storey_name
+from ptmtools.scene.model import Scene
 
 
 def triangle_section(corners: Floats, height: float) -> Floats:
@@ -78,41 +84,70 @@ def _crossing(a: Floats, b: Floats, height: float) -> Floats:
     return (a + share[:, None] * (b - a))[:, [0, 2]]
 
 
-#: A storey has at least this share of the area of the largest one.
+#: A storey that the model does not name has at least this share of the area of the largest one.
 _LEAST_SHARE = 0.15
+#: In a building without ceilings, at most this share of the floor between walls is under one.
+_ROOFLESS_SHARE = 0.05
+#: A storey has the model's name for one that is nearer than half of this, metres.
+_NAME_GAP = 1.5
 
 
-def storeys(cells: Cells, height: float, gap: float) -> list[float]:
-    """The floors' heights, ascending; at least one if there are leaves.
+def storeys(scene: Scene, cells: Cells, height: float) -> list[float]:
+    """The floors' heights, ascending; at least one if there are leaves; ``height`` of the section
+    above a floor, metres."""
+    level, size, roofed = _rooms_floor(scene, cells)
+    order = np.argsort(level, kind="stable")
+    level, size = level[order], size[order]
+    named = [np.array([storey.height]) for storey in scene.storeys]
+    floors: list[float] = []
+    least, share = 0.0, _LEAST_SHARE if roofed else 1.0
+    while size.any():
+        middle = named.pop(0) if named else level
+        total = np.append(0.0, np.cumsum(size))
+        below = total[np.searchsorted(level, middle - height / 2)]
+        within = total[np.searchsorted(level, middle + height / 2, "right")] - below
+        best = int(within.argmax())
+        if within[best] > (least if middle is level else 0.0):
+            median = np.searchsorted(total[1:], below[best] + within[best] / 2)
+            floors.append(float(level[median]))
+            size[abs(level - floors[-1]) <= height / 2] = 0.0
+            least = max(least, share * float(within[best]))
+        elif middle is level:
+            break
+    return sorted(floors)
 
-    Parameters
-    ----------
-    height: of the section above a floor, metres.
-    gap: floors nearer than this to one another belong to one storey, metres.
-    """
-    floors: dict[float, float] = {}
-    for leaf in range(cells.leaf_count):
-        points = cells.leaf_points(leaf)
-        low, high = float(points[:, 1].min()), float(points[:, 1].max())
-        cut = min(low + height, (low + high) / 2)
-        if high - low >= height:
-            floors[low] = floors.get(low, 0.0) + area(leaf_section(cells, leaf, cut))
-    plan = np.abs([area(triangle) for triangle in cells.left_out[:, :, [0, 2]]])
-    for low, size in zip(cells.left_out[:, :, 1].min(axis=1).tolist(), plan.tolist(), strict=True):
-        floors[low] = floors.get(low, 0.0) + size
-    if not floors:
-        return [float(cells.leaf_point[:, 1].min())] if cells.leaf_count else []
-    clusters: list[list[float]] = []
-    for low in sorted(floors):
-        if clusters and low - clusters[-1][0] < gap:
-            clusters[-1].append(low)
-        else:
-            clusters.append([low])
-    areas = [sum(floors[low] for low in cluster) for cluster in clusters]
-    # The floor of a storey is the height with the most area on it.
-    heights = [max(cluster, key=lambda low: floors[low]) for cluster in clusters]
-    largest = max(areas)
-    return [h for h, a in zip(heights, areas, strict=True) if a >= _LEAST_SHARE * largest]
+
+def _rooms_floor(scene: Scene, cells: Cells) -> tuple[Floats, Floats, bool]:
+    """(n,) heights, metres, and (n,) areas in plan, m², of floor under a ceiling, and true; or of
+    all floor, and false, in a building without ceilings. Where eyes may be anywhere, the bottom of
+    each leaf is a floor."""
+    floor = np.concatenate([cells.eye_floor, cells.left_out])
+    body = floor.mean(axis=1)
+    level, size = body[:, 1].copy(), abs(normals(floor)[:, 1]) / 2
+    body[:, 1] += cells.walker.middle
+    if cells.eyes.everywhere and cells.leaf_count:
+        start, up = cells.leaf_point_start, cells.leaf_point[:, 1]
+        middle = np.add.reduceat(cells.leaf_point, start[:-1]) / np.diff(start)[:, None]
+        low, high = np.minimum.reduceat(up, start[:-1]), np.maximum.reduceat(up, start[:-1])
+        body, level = np.concatenate([body, middle]), np.append(level, low)
+        size = np.append(size, cells.leaf_volumes() / (high - low))
+    around = Surroundings(scene.corners, scene.tolerance)
+    covered, leaf = around.cover(body), cells.locate_leaf(body) + 1
+    mostly = np.bincount(leaf, size * covered) >= np.bincount(leaf, size) / 2
+    counts = np.where(leaf > 0, mostly[leaf], covered)
+    walled = around.enclose(body, roofed=False)
+    if size[counts].sum() <= _ROOFLESS_SHARE * size[walled].sum():
+        return level, size, False
+    return level[counts], size[counts], True
+
+
+def storey_names(scene: Scene, floors: Sequence[float]) -> list[str]:
+    """The name of the storey on each of all ``floors``: the model's, else its number; "" for the
+    only one if the model does not name it."""
+    names = [storey_name(scene, floor, _NAME_GAP) for floor in floors]
+    if len(floors) > 1:
+        names = [name or f"Storey {number}" for number, name in enumerate(names, 1)]
+    return names
 
 
 def storey_of(floors: Sequence[float], height: float) -> int:

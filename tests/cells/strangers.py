@@ -41,6 +41,7 @@ class Stranger:
     cells: least and greatest number of cells in which one can stand.
     first: boxes in one of which the eye of the first viewpoint is.
     left_out: most of the triangles that may be in no cell, as a share.
+    floors: heights of the floors of its storeys, metres.
     """
 
     parts: Callable[[], Parts]
@@ -48,6 +49,7 @@ class Stranger:
     cells: tuple[int, int]
     first: tuple[Box, ...]
     left_out: float
+    floors: tuple[float, ...] = (0.0,)
 
 
 def doorway(
@@ -422,6 +424,11 @@ def eyes(
     return tuple(room(x0, y0, x1, y1, pitch * k + 1, pitch * k + 2.2) for k in range(storeys))
 
 
+def floors(storeys: int, pitch: float) -> tuple[float, ...]:
+    """The heights of the floors of storeys."""
+    return tuple(pitch * k for k in range(storeys))
+
+
 #: Expectations were written before the first run. A comment names a figure that proved wrong:
 #: random segments see as much through two doorways or windows as the sets say, and the faces that
 #: are left out are those of the outside, and those where solids touch.
@@ -431,17 +438,19 @@ STRANGERS: Mapping[str, Stranger] = {
     "serpentine": Stranger(serpentine, 0.75, (4, 12), eyes(0, 0, 33.5, 12), 0.6),
     "tile": Stranger(tile, 1.0, (1, 40), (room(0, 0, 550, 550, -10, 50),), 0.05),
     "flat": Stranger(flat, 0.40, (7, 9), eyes(0, -4.2, 15, 5.7), 0.1),
-    "tower": Stranger(tower, 0.10, (60, 72), eyes(-4, -4, 7, 7, 12, 2.7), 0.6),
+    "tower": Stranger(tower, 0.10, (60, 72), eyes(-4, -4, 7, 7, 12, 2.7), 0.6, floors(12, 2.7)),
     "bathroom": Stranger(bathroom, 1.0, (1, 1), eyes(0, 0, 4, 3), 0.05),
     "scanned hall": Stranger(scanned_hall, 1.0, (1, 1), eyes(0, 0, 20, 12), 0.05),
     "square": Stranger(square, 1.0, (1, 20), eyes(0, 0, 62, 60), 0.1),
     "street": Stranger(street, 1.0, (1, 40), eyes(-20, -20, 188, 188), 0.1),
     # 30 % left out
-    "galleries": Stranger(galleries, 1.0, (1, 6), eyes(0, 0, 30, 16, 3, 4.0), 0.52),
+    "galleries": Stranger(galleries, 1.0, (1, 6), eyes(0, 0, 30, 16, 3, 4.0), 0.52, floors(3, 4.0)),
     # 50 %
     "enfilade": Stranger(enfilade, 0.501, (10, 12), eyes(0, 0, 81.8, 7), 0.6),
     # 60 %, from rooms at the windows what is outside among it
-    "plenums": Stranger(plenums, 0.855, (14, 24), eyes(0, -5.2, 12.4, 7.2, 2, 4.8), 0.6),
+    "plenums": Stranger(
+        plenums, 0.855, (14, 24), eyes(0, -5.2, 12.4, 7.2, 2, 4.8), 0.6, floors(2, 4.8)
+    ),
     # In the court or its hall, not in the podium, a wall or on one.
     "castle": Stranger(castle, 1.0, (2, 16), eyes(2.5, 2.5, 37.5, 37.5), 0.3),
     "dollhouse": Stranger(dollhouse, 0.45, (6, 9), eyes(2.1, 0, 8, 5), 0.5),
@@ -451,7 +460,7 @@ STRANGERS: Mapping[str, Stranger] = {
     # 60 %
     "paintings": Stranger(paintings, 0.667, (6, 8), eyes(0, 0, 30.4, 16.2), 0.6),
     # In the hall or on its galleries, which is what the building is for.
-    "atrium": Stranger(atrium, 0.75, (19, 30), eyes(0, 0, 18, 18, 3, 4.2), 0.6),
+    "atrium": Stranger(atrium, 0.75, (19, 30), eyes(0, 0, 18, 18, 3, 4.2), 0.6, floors(3, 4.2)),
     # 75 %, and 60 % left out
     "skylights": Stranger(skylights, 0.876, (4, 6), eyes(0, 0, 36.6, 8), 0.612),
 }

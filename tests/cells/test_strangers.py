@@ -11,6 +11,7 @@ import pytest
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
 from ptmtools.output.model import WriterOptions
 from ptmtools.output.standpoints import FloorFinder
+from ptmtools.output.storeys import storeys
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.scene.orientation.space import to_world
@@ -40,6 +41,8 @@ def test_what_a_person_expects(name: str) -> None:
     least, most = stranger.cells
     assert least <= cells.standing.sum() <= most
     assert first_viewpoint_is_in(stranger.first, scene, cells)
+    floors = to_world(np.array([(0.0, 0.0, z) for z in stranger.floors]), scene.space)
+    assert storeys(scene, cells, 1.2) == pytest.approx(floors[:, 1].tolist())
     lost = [int(note.split()[0]) for note in cells.notes if "lie outside all cells" in note]
     assert sum(lost) <= stranger.left_out * len(scene.triangles)
     assert lost or name in OPEN

@@ -183,7 +183,7 @@ def test_what_was_left_out_is_hatched(artifacts, tmp_path: Path) -> None:
     """A floor beside the row of rooms, and one that makes a storey of its own."""
     low, high = artifacts.cells.leaf_point.min(axis=0), artifacts.cells.leaf_point.max(axis=0)
     beside = np.array([[1, 0, 0], [1, 0, 3], [4, 0, 3]]) + [high[0], low[1], low[2]]
-    above = np.array([[0, 9, 0], [0, 9, 4], [12, 9, 4]]) + low
+    above = np.array([[0, 2.2, 0], [0, 2.2, 4], [12, 2.2, 4]]) + low
     cells, hatched = artifacts.cells, []
     for left_out in (np.zeros((0, 3, 3)), beside[None], above[None]):
         changed = replace(artifacts, cells=replace(cells, left_out=left_out))

@@ -12,7 +12,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output import EmitOptions, GivenViewpoint
 from ptmtools.output.standpoints import FloorFinder
-from ptmtools.output.storeys import area, leaf_section, polygon_section, storeys, triangle_section
+from ptmtools.output.storeys import area, leaf_section, polygon_section, triangle_section
 from ptmtools.output.viewpoints import orientation, place_viewpoints, storey_numbers, walk
 from ptmtools.output.views import lengths
 from ptmtools.scene.model import Camera, Scene, Storey
@@ -388,15 +388,3 @@ def test_sections(room_row) -> None:
     above = triangle_section(scene.corners, 3.5)
     length = np.linalg.norm(above[:, 1] - above[:, 0], axis=1).sum()
     assert np.isclose(length, 2 * 12 + 4 * 4), "above the doors the partitions are whole"
-
-
-def test_storeys(room_row) -> None:
-    _, cells = room_row(2)
-    assert storeys(cells, 1.2, 1.5) == [0.0]
-    lifted = cells.leaf_point.copy()
-    lifted[8:, 1] += 4
-    two = replace(cells, leaf_point=lifted)
-    assert storeys(two, 1.2, 1.5) == [0.0, 4.0]
-    step = cells.leaf_point.copy()
-    step[8:, 1] += 0.5
-    assert len(storeys(replace(cells, leaf_point=step), 1.2, 1.5)) == 1
