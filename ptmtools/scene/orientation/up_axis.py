@@ -269,6 +269,8 @@ STOREYS, NUMBER, UNLIKE = (2.7, 5.0), 1.0, 1.5
 FLAT = 0.003
 #: The height of a door in metres, and the relative deviation without cost.
 DOOR, DOORS_DIFFER = 2.1, 0.2
+#: Doors of halls may be as high as this share of their height.
+PORTAL = 0.3
 #: Upper bound of one cost, so that the other criteria still decide on the axis.
 _MOST = 10.0
 #: A candidate with another axis, or with another unit, is close to the best one if it costs less
@@ -424,7 +426,7 @@ def _costs(measured: Evidence, lying: Evidence, metres: float) -> dict[str, floa
         "faces match their names": 2 * (1 - measured.named),
         "usual size": _size_cost(measured, metres),
         "usual room height": measured.storey[1] * _room_cost(measured.storey[0] * metres),
-        "usual door height": _door_cost(measured.door * metres),
+        "usual door height": _door_cost(measured.door * metres, measured.storey[0] * metres),
     }
 
 
@@ -466,8 +468,8 @@ def _visitor_cost(rooms: RoomSizes, metres: float) -> float:
     return NO_VISITOR * max(0.0, 1 - share / ENOUGH)
 
 
-def _door_cost(height: float) -> float:
-    if not height > 0:
+def _door_cost(height: float, room: float) -> float:
+    if not height > 0 or DOOR <= height <= PORTAL * room:
         return 0.0
     return min(1.5, 3 * max(0.0, abs(_log_ratio(height, DOOR)) - DOORS_DIFFER))
 
