@@ -364,10 +364,12 @@ class Surroundings:
         result: Bools = self._hits(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)))[0] >= 0
         return result
 
-    def see_out(self, points: Floats) -> Bools:
-        """(n,) whether a level ray or one upwards from each of (n, 3) points meets nothing, not
-        even the edge of a surface."""
-        along = np.append(self._level, [[0.0, 1.0, 0.0]], axis=0)
+    def see_out(self, points: Floats, rises: tuple[float, ...] = (0.0,)) -> Bools:
+        """(n,) whether a ray from each of (n, 3) points, upwards or rising by any of ``rises`` for
+        a length of 1 in plan, meets nothing, not even the edge of a surface."""
+        along = np.concatenate(
+            [*(self._level + [0.0, rise, 0.0] for rise in rises), [[0.0, 1.0, 0.0]]]
+        )
         hit = self._hits(np.repeat(points, len(along), axis=0), np.tile(along, (len(points), 1)))
         return np.asarray((hit < 0).all(axis=0).reshape(len(points), -1).any(axis=1))
 

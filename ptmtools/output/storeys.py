@@ -152,6 +152,18 @@ def storey_names(scene: Scene, floors: Sequence[float]) -> list[str]:
     return names
 
 
+def main_floors(floors: Floats, sizes: Floats, gap: float) -> Floats:
+    """The heights of storeys, ascending: that of (n,) ``floors`` with the most area on it, the
+    lowest of equal ones, then the next that is more than ``gap`` metres from it, and so on."""
+    height, floor = np.unique(np.round(floors, 2), return_inverse=True)
+    waiting = height[np.argsort(-np.bincount(floor, sizes), kind="stable")]
+    heights = []
+    while len(waiting):
+        heights.append(waiting[0])
+        waiting = waiting[abs(waiting - waiting[0]) > gap]
+    return np.sort(np.array(heights))
+
+
 def storey_of(floors: Sequence[float], height: float) -> int:
     """The storey of a height, given all ``floors``: the nearest one below."""
     return max(0, int(np.searchsorted(floors, height, side="right")) - 1)

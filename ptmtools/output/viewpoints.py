@@ -4,11 +4,11 @@ the navigation can start").
 They are the user's, else the model's cameras; then one in each of the largest rooms without one
 (`standpoints`, `views`), with the name that the model gives the room, if any. A browser that
 ignores cells lists them in its menu and leads from one to the next in the order of the file, so
-the next one should be next door. The shortest ways from the
-first room form a tree (Dijkstra, over leaves and portals); the rooms are in the order of a walk
-around that tree, the shortest branch first, one storey after the other. A browser in WALK mode
-drops the viewpoint onto the floor, so it is put there beforehand: at the height of the eye above
-the nearest upward-facing surface below.
+the next one should be next door. The shortest ways from the first room form a tree (Dijkstra, over
+leaves and portals); the rooms are in the order of a walk around that tree, the shortest branch
+first, one storey after the other, and on each the rooms before places outdoors. A browser in WALK
+mode drops the viewpoint onto the floor, so it is put there beforehand: at the height of the eye
+above the nearest upward-facing surface below.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
+from ptmtools.output.floors import FloorFinder
 from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions, storey_name
-from ptmtools.output.standpoints import FloorFinder, largest_leaves, places
+from ptmtools.output.standpoints import places
 from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE
@@ -64,16 +65,6 @@ def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[in
         order += stops_of.get(leaf, [])
         waiting += sorted(onwards.get(leaf, ()), key=lambda leaf: (-reach[leaf], -leaf))
     return order + sorted(set(range(len(stops))) - set(order))
-
-
-def storey_numbers(floors: Sequence[float], apart: float) -> list[int]:
-    """The storey of each of these heights, from 0 for the lowest: a new one begins where a height
-    is more than ``apart`` metres above the next lower one."""
-    order = np.argsort(floors, kind="stable")
-    rise = np.diff(np.array(floors)[order], prepend=floors[order[0]] if len(floors) else 0.0)
-    storeys = np.empty(len(floors), dtype=np.int64)
-    storeys[order] = np.cumsum(rise > apart)
-    return [int(storey) for storey in storeys]
 
 
 def _ways(cells: Cells, start: int, tall: float) -> tuple[list[float], list[int]]:
@@ -131,7 +122,7 @@ def place_viewpoints(
     else:
         initial = _cameras(scene, cells, ground, options, notes)
     if options.viewpoint_count or not initial:
-        initial = [*initial, *_touring(scene, cells, ground, outlook, options, initial)]
+        initial += _touring(scene, cells, ground, outlook, options, initial, notes)
     return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(initial)), tuple(notes)
 
 
@@ -254,24 +245,27 @@ def _touring(
     outlook: Outlook,
     options: WriterOptions,
     initial: Sequence[Viewpoint],
+    notes: list[str],
 ) -> list[Viewpoint]:
     """A viewpoint for each room without one, in the order of a walk from the first."""
     numbers = cells.room_numbers.tolist()
     taken = {numbers[v.cell] for v in initial}
     count = max(options.viewpoint_count, not initial)
     size = options.avatar(cells.walker)
-    rooms = places(scene, cells, ground, outlook, size, count + len(taken))
+    rooms, more = places(scene, cells, ground, outlook, size, count + len(taken))
+    if more:
+        notes.append(f"rooms without a viewpoint: {more}; --viewpoint-count adds some")
     rooms = [place for place in rooms if numbers[place.cell] not in taken][:count]
     if not rooms:
         return [] if initial else [_anywhere(cells, outlook, options)]
     leaf = cells.locate_leaf(np.array([place.position for place in rooms])).tolist()
     start = int(cells.locate_leaf(np.array(initial[0].position))[0]) if initial else leaf[0]
-    eye = options.avatar(cells.walker)[1]
-    order = walk(cells, start, leaf, eye)
-    storey = storey_numbers([place.floor for place in rooms], eye)
-    first = list(dict.fromkeys(storey[i] for i in order))
-    order.sort(key=lambda i: first.index(storey[i]))
-    names = _storey_names(scene, [place.floor for place in rooms], storey, eye)
+    order = walk(cells, start, leaf, size[1])
+    height = [place.storey for place in rooms]
+    first = list(dict.fromkeys(height))
+    order.sort(key=lambda i: (first.index(height[i]), not rooms[i].indoors))
+    storey = [sorted(first).index(h) for h in height]
+    names = _storey_names(scene, [place.floor for place in rooms], storey, size[1])
     number: Counter[tuple[str, str]] = Counter()
     views: list[Viewpoint] = []
     for i in order:
@@ -311,7 +305,7 @@ def _storey_names(
 
 def _anywhere(cells: Cells, outlook: Outlook, options: WriterOptions) -> Viewpoint:
     """A viewpoint in the middle of the largest leaf."""
-    (leaf,) = largest_leaves(cells, 1)
+    leaf = int(np.where(cells.leaf_standing, cells.leaf_volumes(), -1.0).argmax())
     middle = cells.leaf_points(leaf).mean(axis=0)
     view, cell = outlook.best(middle[None], float(middle[1])), int(cells.leaf_cell[leaf])
     return _viewpoint("Room 1", middle, _heading(view.yaw), options.field_of_view, cell)

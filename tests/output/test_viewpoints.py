@@ -11,9 +11,15 @@ from hypothesis import example, given, strategies as st
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output import EmitOptions, GivenViewpoint
-from ptmtools.output.standpoints import FloorFinder
-from ptmtools.output.storeys import area, leaf_section, polygon_section, triangle_section
-from ptmtools.output.viewpoints import orientation, place_viewpoints, storey_numbers, walk
+from ptmtools.output.floors import FloorFinder
+from ptmtools.output.storeys import (
+    area,
+    leaf_section,
+    main_floors,
+    polygon_section,
+    triangle_section,
+)
+from ptmtools.output.viewpoints import orientation, place_viewpoints, walk
 from ptmtools.output.views import lengths
 from ptmtools.scene.model import Camera, Scene, Storey
 
@@ -225,9 +231,11 @@ def test_names_of_rooms_follow_those_of_storeys(room_row) -> None:
     ]
 
 
-def test_storeys_of_heights() -> None:
-    assert storey_numbers([0.0, 4.0, 0.2, 4.1, 1.7], 1.6) == [0, 1, 0, 1, 0]
-    assert storey_numbers([], 1.6) == []
+def test_main_floors_are_the_largest() -> None:
+    floors, sizes = np.array([0.0, 4.0, 0.2, 4.1, 1.7, 4.0, 0.0]), np.array([9, 3, 8, 5, 1, 3, 0.0])
+    assert main_floors(floors, sizes, 1.6).tolist() == [0.0, 1.7, 4.0]
+    assert main_floors(floors[::-1], sizes[::-1], 1.8).tolist() == [0.0, 4.0]
+    assert main_floors(floors, sizes * 0, 1.6).tolist() == [0.0, 1.7, 4.0], "the lowest first"
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -134,8 +134,8 @@ class EmitStage(Stage[None]):
 
     name = "emit"
     about = "Write the served files: cells and hints."
-    recipe = 18
-    changed = "walks through buildings without ceilings begin in rooms"
+    recipe = 19
+    changed = "walks begin on the storey at the ground, and on the main floor of rooms"
     options = EmitOptions
 
     def read_with(self, options: EmitOptions) -> tuple[Stage[Any], ...]:
