@@ -75,8 +75,9 @@ def test_chosen_look_down_the_row(room_row) -> None:
 
 def test_only_so_many(room_row) -> None:
     scene, cells = room_row(3)
-    views, _ = place_viewpoints(scene, cells, EmitOptions(viewpoint_count=2))
+    views, notes = place_viewpoints(scene, cells, EmitOptions(viewpoint_count=2))
     assert [v.name for v in views] == ["VP_0", "VP_1"]
+    assert notes == ("rooms without a viewpoint: 1; --viewpoint-count adds some",)
     (view,), _ = place_viewpoints(scene, cells, EmitOptions(viewpoint_count=0))
     assert view == views[0]
     with pytest.raises(InputError, match="PTM-I111"):
