@@ -224,7 +224,7 @@ class WriterOptions:
     viewpoint_count: int = option(
         32,
         "Maximum number of viewpoints in addition to those of --viewpoint and of the model's "
-        "cameras: one per room, largest rooms first. They are listed in the order in which a walk "
+        "cameras: one per room, the best first. They are listed in the order in which a walk "
         "passes them.",
     )
     avatar_size: Vector | None = option(

@@ -23,9 +23,8 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
-from ptmtools.output.floors import FloorFinder
 from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions, storey_name
-from ptmtools.output.standpoints import places
+from ptmtools.output.standpoints import FloorFinder, places
 from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE

@@ -8,7 +8,7 @@ first
    after the ground;
 3. on the storey at the height of the ground, then on storeys with daylight, then on dark ones; of
    these first those above the ground, and the nearer ones;
-4. with a ceiling as low as that of a room;
+4. with a ceiling as low as that of a room, or with daylight: a ceiling may be a painted sky;
 5. with large floors, of which dark ones count half; the lower of equal ones.
 
 The ground is where rain falls around the building and no floor is below; without it, the lowest of
@@ -18,6 +18,7 @@ it leaves the model, or passes glass.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,6 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.options import WALKER
 from ptmtools.cells.room_kinds import SpaceKind, space_kinds
 from ptmtools.cells.structure import Surroundings
-from ptmtools.output.floors import FloorFinder
 from ptmtools.output.model import EYE
 from ptmtools.output.storeys import main_floors
 from ptmtools.scene.model import Scene
@@ -83,16 +83,18 @@ class Room:
         return self.rank[1] <= 1
 
 
-def rooms_to_visit(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) -> list[Room]:
+def rooms_to_visit(
+    scene: Scene, cells: Cells, floor_below: Callable[[Floats], Floats], eye: float
+) -> list[Room]:
     """The rooms in which an eye at a height of ``eye`` metres is inside, the best to begin in
-    first."""
+    first. ``floor_below`` gives the heights of the floors below (n, 3) points."""
     leaves = np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0))
     corners = [cells.leaf_points(leaf) for leaf in leaves.tolist()]
     if not corners:
         return []
     points = np.stack([_look_points(leaf) for leaf in corners])
     low, high = (np.array([end(leaf[:, 1]) for leaf in corners]) for end in (np.min, np.max))
-    floor = np.median(ground.floor_below(points.reshape(-1, 3)).reshape(len(points), -1), axis=1)
+    floor = np.median(floor_below(points.reshape(-1, 3)).reshape(len(points), -1), axis=1)
     fits = (floor + eye > low) & (floor + eye < high)
     height = np.where(fits, eye, np.maximum(points[:, 0, 1] - floor, 0.0))
     points[:, :, 1] = np.where(fits, floor + eye, points[:, 0, 1])[:, None]
@@ -104,7 +106,7 @@ def rooms_to_visit(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) 
         kind[court] = SpaceKind.ROOM
     if not fits.any():
         return []
-    level = _ground_level(scene, around, points[fits], ground, eye)
+    level = _ground_level(scene, around, points[fits], floor_below, eye)
     named = np.array([bool(cells.room_name(i)) for i in range(cells.cell_count)])[cell]
     group = np.where(named, 0, np.where(kind <= SpaceKind.HALL, 1, 2 * kind + roof))[fits]
     leaves, points, kind, floor = leaves[fits], points[fits], kind[fits], floor[fits]
@@ -120,8 +122,9 @@ def rooms_to_visit(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) 
     size = np.bincount(room, area, count)
     lit = np.zeros(len(leaves), dtype=np.bool_)
     lit[indoors] = _have_daylight(scene, around, points[indoors])
-    worth = size * np.where(np.bincount(room, lit, count) > 0, 1.0, _DARK)
-    hall = 2 * np.bincount(room, area * (kind == SpaceKind.HALL), count) > size
+    dark = np.bincount(room, lit, count) == 0
+    worth = size * np.where(dark, _DARK, 1.0)
+    high = dark & (2 * np.bincount(room, area * (kind == SpaceKind.HALL), count) > size)
     turn = _turns(heights, level, storey, area * indoors, area * lit, eye)
     kinds, same = np.unique(keys[:, :2], axis=0, return_inverse=True)
     largest = np.zeros(len(kinds))
@@ -131,7 +134,7 @@ def rooms_to_visit(scene: Scene, cells: Cells, ground: FloorFinder, eye: float) 
     for i, (number, kind_group, k) in enumerate(keys.tolist()):
         inside = np.flatnonzero(room == i)
         inside = inside[np.lexsort((leaves[inside], -area[inside]))]
-        rank = (int(small[i]), kind_group, int(turn[k]), int(hall[i]))
+        rank = (int(small[i]), kind_group, int(turn[k]), int(high[i]))
         rooms.append(
             Room(number, rank, float(worth[i]), float(heights[k]), leaves[inside], floor[inside])
         )
@@ -169,7 +172,11 @@ def _kinds(
 
 
 def _ground_level(
-    scene: Scene, around: Surroundings, points: Floats, ground: FloorFinder, eye: float
+    scene: Scene,
+    around: Surroundings,
+    points: Floats,
+    floor_below: Callable[[Floats], Floats],
+    eye: float,
 ) -> float | None:
     """The height of the ground around the building, which has (n, k, 3) points; None without it."""
     plan = points.reshape(-1, 3)[:, [0, 2]]
@@ -177,7 +184,7 @@ def _ground_level(
     share = (np.arange(_DROPS) + 0.5) / _DROPS
     grid = np.stack(np.meshgrid(share, share, indexing="ij"), axis=-1).reshape(-1, 2)
     drops = np.insert(low + grid * (high - low), 1, scene.points[:, 1].max(), axis=1)
-    height = ground.floor_below(drops)
+    height = floor_below(drops)
     drops[:, 1] = height + eye
     drops = drops[np.isfinite(height)]
     eyes = np.full(len(drops), eye)
@@ -195,13 +202,11 @@ def _have_daylight(scene: Scene, around: Surroundings, points: Floats) -> Bools:
     """(n,) which spaces have daylight, by (n, k, 3) points in them."""
     if not scene.opaque.all():
         around = Surroundings(scene.corners[scene.opaque], scene.tolerance)
-    parts = [around.see_out(part.reshape(-1, 3), _RISES) for part in _parts(points)]
-    sees = np.concatenate([np.zeros(0, np.bool_), *parts])
-    return np.asarray(sees.reshape(-1, points.shape[1]).any(axis=1))
-
-
-def _parts(points: Floats) -> list[Floats]:
-    return [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
+    sees = np.zeros(points.shape[:2], dtype=np.bool_)
+    for i in range(0, len(points), _AT_ONCE):
+        some = points[i : i + _AT_ONCE]
+        sees[i : i + _AT_ONCE] = around.see_out(some.reshape(-1, 3), _RISES).reshape(some.shape[:2])
+    return np.asarray(sees.any(axis=1))
 
 
 def _is_roofless(cell: NDArray[np.int32], room: Floats, court: Floats) -> bool:

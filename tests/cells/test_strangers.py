@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
-from ptmtools.output.floors import FloorFinder
 from ptmtools.output.model import WriterOptions
+from ptmtools.output.standpoints import FloorFinder
 from ptmtools.output.storeys import storeys
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.scene import IngestOptions, Scene, ingest

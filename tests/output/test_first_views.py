@@ -42,11 +42,20 @@ def test_a_house_begins_at_the_ground(tmp_path: Path) -> None:
 
 
 def test_a_loft_comes_after_the_nave(tmp_path: Path) -> None:
-    """Though its ceiling is as low as a room's."""
+    """Though its ceiling is as low as a room's; and the nave before a chapel, since it has windows
+    and is no sky over a house."""
     nave, loft = room(0, 0, 30, 10, 0, 14), room(0, 0, 30, 10, 14.2, 18)
-    hatch = (2, 2, 14), (3, 3, 14.2)
-    _, floors = viewpoints(tmp_path, {"walls": carved([nave, loft], [hatch])})
+    chapel = room(0, 10.2, 6, 16, 0, 4)
+    holes = [((2, 2, 14), (3, 3, 14.2)), ((2, 10, 0), (4, 10.2, 3))]
+    windows = [((x, -0.2, 6), (x + 2, 0, 12)) for x in (5, 15, 25)]
+    rooms = [nave, loft, chapel]
+    views, floors = viewpoints(tmp_path, {"walls": carved(rooms, [*holes, *windows])})
+    assert len(views) == 3
     assert floors[0] == 0
+    assert views[0].position[2] > -2, "in the nave"
+    views, floors = viewpoints(tmp_path, {"walls": carved(rooms, holes)})
+    assert floors[0] == 0
+    assert views[0].position[2] < -2, "in the chapel"
 
 
 def test_passengers_wait_on_the_platform(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from hypothesis import example, given, strategies as st
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.output import EmitOptions, GivenViewpoint
-from ptmtools.output.floors import FloorFinder
+from ptmtools.output.standpoints import FloorFinder
 from ptmtools.output.storeys import (
     area,
     leaf_section,
