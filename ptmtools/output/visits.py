@@ -111,8 +111,9 @@ def rooms_to_visit(
     group = np.where(named, 0, np.where(kind <= SpaceKind.HALL, 1, 2 * kind + roof))[fits]
     leaves, points, kind, floor = leaves[fits], points[fits], kind[fits], floor[fits]
     area, indoors = (volume / (high - low))[fits], group <= 1
-    heights = main_floors(floor, np.where(indoors, area, 0.0), eye)
-    storey = abs(floor[:, None] - heights).argmin(axis=1)
+    covered = indoors | around.cover(points[:, 0])  # decks of a car park, not terrain
+    heights = main_floors(floor, np.where(covered, area, 0.0), eye)
+    storey = abs(floor[:, None] - heights).round(2).argmin(axis=1)
     keys, room = np.unique(
         np.stack([cells.room_numbers[cell[fits]], group, storey], axis=1),
         axis=0,
@@ -121,11 +122,11 @@ def rooms_to_visit(
     room, count = room.reshape(-1), len(keys)
     size = np.bincount(room, area, count)
     lit = np.zeros(len(leaves), dtype=np.bool_)
-    lit[indoors] = _have_daylight(scene, around, points[indoors])
+    lit[covered] = _have_daylight(scene, around, points[covered])
     dark = np.bincount(room, lit, count) == 0
     worth = size * np.where(dark, _DARK, 1.0)
-    high = dark & (2 * np.bincount(room, area * (kind == SpaceKind.HALL), count) > size)
-    turn = _turns(heights, level, storey, area * indoors, area * lit, eye)
+    sky = dark & (2 * np.bincount(room, area * (kind == SpaceKind.HALL), count) > size)
+    turn = _turns(heights, level, storey, area * covered, area * lit, eye)
     kinds, same = np.unique(keys[:, :2], axis=0, return_inverse=True)
     largest = np.zeros(len(kinds))
     np.maximum.at(largest, same.reshape(-1), size)
@@ -134,7 +135,7 @@ def rooms_to_visit(
     for i, (number, kind_group, k) in enumerate(keys.tolist()):
         inside = np.flatnonzero(room == i)
         inside = inside[np.lexsort((leaves[inside], -area[inside]))]
-        rank = (int(small[i]), kind_group, int(turn[k]), int(high[i]))
+        rank = (int(small[i]), kind_group, int(turn[k]), int(sky[i]))
         rooms.append(
             Room(number, rank, float(worth[i]), float(heights[k]), leaves[inside], floor[inside])
         )
@@ -142,14 +143,14 @@ def rooms_to_visit(
 
 
 def _turns(
-    heights: Floats, level: float | None, storey: Ints, indoors: Floats, lit: Floats, eye: float
+    heights: Floats, level: float | None, storey: Ints, covered: Floats, lit: Floats, eye: float
 ) -> Ints:
     """The turn of storeys at (s,) ``heights`` above ground at a ``level``, None if unknown, by the
-    (n,) ``storey`` of floors, and m² of each indoors and with daylight."""
-    indoor, bright = (np.bincount(storey, area, len(heights)) for area in (indoors, lit))
-    dim = bright < _LIT_SHARE * indoor
+    (n,) ``storey`` of floors, and m² of each under a ceiling and with daylight."""
+    total, bright = (np.bincount(storey, area, len(heights)) for area in (covered, lit))
+    dim = bright < _LIT_SHARE * total
     if level is None:
-        large = np.where(dim & ~dim.all(), 0.0, indoor)
+        large = np.where(dim & ~dim.all(), 0.0, total)
         level = float(heights[large >= _MAIN_SHARE * large.max()][0])
     off = heights - level
     far, below = abs(off) > _AT_GROUND * eye, off < 0
@@ -200,7 +201,7 @@ def _ground_level(
 
 def _have_daylight(scene: Scene, around: Surroundings, points: Floats) -> Bools:
     """(n,) which spaces have daylight, by (n, k, 3) points in them."""
-    if not scene.opaque.all():
+    if scene.opaque.any() and not scene.opaque.all():
         around = Surroundings(scene.corners[scene.opaque], scene.tolerance)
     sees = np.zeros(points.shape[:2], dtype=np.bool_)
     for i in range(0, len(points), _AT_ONCE):

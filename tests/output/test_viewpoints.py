@@ -340,6 +340,13 @@ def test_one_sided_ceilings_are_no_floors(room_row) -> None:
     assert view.position == (2.0, 2.0, 0.0), "the floor's back is no floor either"
 
 
+def test_rooms_of_glass(room_row) -> None:
+    scene, cells = room_row(2)
+    glass = tuple(replace(material, transparent=True) for material in scene.materials)
+    views, _ = place_viewpoints(replace(scene, materials=glass), cells, EmitOptions())
+    assert [v.cell for v in views] == [0, 1]
+
+
 def test_given_ones(room_row) -> None:
     scene, cells = room_row(3)
     wanted = (
