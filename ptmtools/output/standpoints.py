@@ -179,10 +179,11 @@ def _place_in(
     number = np.repeat(cut, [len(grid) for grid in grids])
     position = np.insert(np.concatenate(grids), 1, heights[number], axis=1)
     floor = ground.floor_below(position)
-    share = np.array([area(section) for section in sections]) / np.bincount(
-        number, minlength=len(sections)
-    ).clip(1)
+    share = np.array([area(section) for section in sections])
+    share /= np.bincount(number, minlength=len(sections)).clip(1)
     near = abs(floor - room.storey) <= eye
+    if not near.any():
+        return None
     main = _main_floor(floor, share[number] * near, step)
     walls = outlook.walls(main + eye)
     clearance = np.concatenate(
