@@ -1,6 +1,6 @@
 """Compiled loops: growth of flat regions over a mesh (`fabric`), connected indices (`search`),
 descent of whole triangles through a BSP tree (`ownership`), points above floors (`model`), shadows
-near regions of floor (`places`).
+near regions of floor (`places`), polygons that meet (`rooms`).
 """
 
 from __future__ import annotations
@@ -273,4 +273,31 @@ def sides_separate(corner: Floats, shadow: Floats, hull: Floats, reach: float) -
             after &= away > greatest
         if before or after:
             return True
+    return False
+
+
+@plain_kernel
+def outlines_meet(point: Floats, start: Ints, pairs: Ints, near: float, meets: Bools) -> None:
+    """Sets ``meets``, (n,), for those of (n, 2) pairs of polygons, given by (p, 3) corners and
+    their CSR, of which one has a corner within ``near`` of the outline of the other."""
+    for i in range(len(pairs)):
+        a = point[start[pairs[i, 0]] : start[pairs[i, 0] + 1]]
+        b = point[start[pairs[i, 1]] : start[pairs[i, 1] + 1]]
+        meets[i] = corner_near(a, b, near) or corner_near(b, a, near)
+
+
+@plain_kernel
+def corner_near(corner: Floats, polygon: Floats, near: float) -> bool:
+    """Whether one of (n, 3) points is within ``near`` of the outline of an (m, 3) polygon."""
+    for e in range(len(polygon)):
+        p, q = polygon[e], polygon[(e + 1) % len(polygon)]
+        x, y, z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        square = x * x + y * y + z * z
+        for k in range(len(corner)):
+            u, v, w = corner[k, 0] - p[0], corner[k, 1] - p[1], corner[k, 2] - p[2]
+            share = (u * x + v * y + w * z) / square if square > 0.0 else 0.0
+            share = min(max(share, 0.0), 1.0)
+            u, v, w = u - share * x, v - share * y, w - share * z
+            if u * u + v * v + w * w <= near * near:
+                return True
     return False

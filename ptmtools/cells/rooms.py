@@ -121,8 +121,6 @@ OPEN_WITHIN = 0.4
 LARGE_OPENING = 4.0
 #: A volume is one room if a region has more than this share of its standing leaves.
 ONE_ROOM = 2 / 3
-#: Pairs of portals that are compared at a time.
-AT_ONCE = 2048
 
 
 def room_of_leaf(cells: Cells, rank: Ints, volume: Ints) -> Ints:
@@ -298,39 +296,25 @@ def _section(volume: float, plan: Geometry) -> float:
 
 def _touching(cells: Cells, near: float) -> list[list[int]]:
     """For every portal those that it meets, within ``near`` metres, ascending."""
+    from ptmtools.cells.kernels import outlines_meet
+
     result: list[list[int]] = [[] for _ in range(cells.portal_count)]
     if not result:
         return result
     start = cells.portal_start[:-1]
-    last = np.diff(cells.portal_start) - 1
     low = np.minimum.reduceat(cells.portal_point, start) - near / 2
     high = np.maximum.reduceat(cells.portal_point, start) + near / 2
     boxes = shapely.box(low[:, 0], low[:, 2], high[:, 0], high[:, 2])
     i, j = shapely.STRtree(boxes).query(boxes, predicate="intersects")
     close = (i < j) & (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
     i, j = i[close], j[close]
-    order = np.lexsort((j, i))
-    i, j = i[order], j[order]
-    corner = np.minimum(np.arange(int(last.max()) + 1), last[:, None])
-    polygon = cells.portal_point[start[:, None] + corner]  # shorter ones repeat their last point
-    for part in range(0, len(i), AT_ONCE):
-        rows = slice(part, part + AT_ONCE)
-        p, q = polygon[i[rows]], polygon[j[rows]]
-        meet = np.minimum(_distance(p, q), _distance(q, p)) <= near
-        for a, b in zip(i[rows][meet].tolist(), j[rows][meet].tolist(), strict=True):
-            result[a].append(b)
-            result[b].append(a)
+    pairs = np.column_stack([i, j])[np.lexsort((j, i))]
+    meets = np.zeros(len(pairs), dtype=np.bool_)
+    outlines_meet(cells.portal_point, cells.portal_start, pairs, near, meets)
+    for a, b in pairs[meets].tolist():
+        result[a].append(b)
+        result[b].append(a)
     return result
-
-
-def _distance(points: Floats, polygon: Floats) -> Floats:
-    """(n,) metres between the nearest of (n, m, 3) points and the outline of (n, m, 3) polygons."""
-    along = np.roll(polygon, -1, axis=1) - polygon
-    square = np.maximum(np.einsum("nek,nek->ne", along, along), np.finfo(np.float64).tiny)
-    to = points[:, :, None] - polygon[:, None]
-    share = np.clip(np.einsum("npek,nek->npe", to, along) / square[:, None], 0.0, 1.0)
-    nearest = np.linalg.norm(to - share[..., None] * along[:, None], axis=3)
-    return np.asarray(nearest.min(axis=(1, 2)))
 
 
 #: The warning on a model of one cell.
