@@ -5,11 +5,12 @@ plane. The plane with the best score
 
     0.5 · occlusion + 0.3 · balance + 0.2 · (1 − splits)
 
-splits it; nodes are split in the order of the wall area that their best plane brings. Where no wall
-is left, reveals may split, then door leaves, then caps (`split_planes`). A side thinner than a leaf
-may be is refused, so that no leaf is flat after rounding to float32; where a side would be thinner
-than the cluster distance, the wall must close an opening of the near boundary, or be the other face
-of a thin wall (`_seals`), for which it waits until no other wall splits.
+splits it, but what curved walls cut, or what cuts them, weighs 1.0; nodes are split in the order of
+the wall area that their best plane brings. Where no wall is left, reveals may split, then door
+leaves, then caps (`split_planes`). A side thinner than a leaf may be is refused, so that no leaf is
+flat after rounding to float32; where a side would be thinner than the cluster distance, the wall
+must close an opening of the near boundary, or be the other face of a thin wall (`_seals`), for
+which it waits until no other wall splits.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ from ptmtools.tolerance import TIE_SHARE, Tolerance, rank
 OCCLUSION_WEIGHT = 0.5
 BALANCE_WEIGHT = 0.3
 SPLIT_WEIGHT = 0.2
+#: Cuts of facets of a curved wall, and by them, weigh this much more: one plane cuts them all.
+CURVE_WEIGHT = 0.8
 #: A fragment smaller than this share of `SubdivideOptions.wall_area` no longer splits.
 FRAGMENT_SHARE = 0.01
 #: Up to this many fragments of a node are tested by their corners, more by their boxes first.
@@ -342,6 +345,7 @@ def _best_split(
     if not fragments:
         return -1
     extents = _Extents(fragments)
+    curved = np.array([f.wall.curved for f in fragments])
     best, best_score = -1, -np.inf
     for turn, i in _candidates(fragments):
         if turn and best >= 0:
@@ -362,11 +366,14 @@ def _best_split(
             continue
         front, back = extents.ahead(plane, tolerance), extents.ahead(-plane, tolerance)
         others = len(fragments) - 1
-        split = int(np.count_nonzero(front & back))
+        cuts = front & back
+        split = int(np.count_nonzero(cuts))
+        bent = split if f.wall.curved else int(np.count_nonzero(cuts & curved))
         ahead, behind = int(np.count_nonzero(front)), int(np.count_nonzero(back))
         score = OCCLUSION_WEIGHT * f.area / f.section_area
         score += BALANCE_WEIGHT * (min(ahead, behind) / max(ahead, behind, 1))
         score += SPLIT_WEIGHT * (1.0 - split / max(others, 1))
+        score -= CURVE_WEIGHT * bent / max(others, 1)
         if score > best_score + TIE_SHARE:
             best, best_score = i, score
     return best

@@ -14,7 +14,7 @@ opposite directions in the two is ignored.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ from ptmtools.arrays import Bools, Floats, Ints, areas, normals, sum_by_group
 from ptmtools.cells.fabric import Fabric, Facets, Welded
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
-from ptmtools.cells.planes import PlaneFrame, planes_of
+from ptmtools.cells.planes import PlaneFrame, bounds, planes_of
 from ptmtools.cells.search import Bins, Nearby, Tries, connect
 from ptmtools.embree import ray_tree
 from ptmtools.scene.model import Scene
@@ -41,6 +41,7 @@ class WallPlane:
     blocking: Geometry  # everything opaque and structural, which hides
     # What stops visitors: ``blocking`` without the leaves that they pass; None if it has none.
     barring: Geometry | None = None
+    curved: bool = False  # whether it is a facet of a curved wall
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +154,26 @@ def find_walls(
         sure = area
         scanned = not facets and _is_scan(area, leans)
     kept = np.flatnonzero((sure > 0) & ~(scanned & leans))
-    return walls[kept][rank(area[kept])].tolist(), int(np.count_nonzero(sure)) - len(kept)
+    planes_kept = _mark_curved(walls[kept][rank(area[kept])].tolist(), structure.tolerance)
+    return planes_kept, int(np.count_nonzero(sure)) - len(kept)
+
+
+def _mark_curved(walls: list[WallPlane], tolerance: Tolerance) -> list[WallPlane]:
+    """The walls; upright ones that meet two others at small angles are curved (ducts are not)."""
+    if not walls:
+        return walls
+    points = [w.frame.to_space(shapely.get_coordinates(w.walls)) for w in walls]
+    box = np.array([bounds(p) for p in points])
+    box += tolerance.plane / 2 * np.array([[-1.0], [1.0]])
+    low, high = box[:, 0], box[:, 1]
+    plan = shapely.box(low[:, 0], low[:, 2], high[:, 0], high[:, 2])
+    i, j = shapely.STRtree(plan).query(plan)
+    normal = np.array([w.frame.plane[:3] for w in walls])
+    turn = np.abs(np.einsum("ij,ij->i", normal[i], normal[j]))
+    meets = (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
+    meets &= (turn >= _CURVE) & (turn < tolerance.cosine) & (np.abs(normal[i, 1]) < _STRAIGHT)
+    curved = np.bincount(i[meets], minlength=len(walls)) >= 2
+    return [replace(w, curved=bool(c)) for w, c in zip(walls, curved, strict=True)]
 
 
 def _is_scan(area: Floats, leans: Bools) -> bool:
@@ -238,6 +258,8 @@ def _layers(structure: Structure, wall_area: float) -> Ints:
 _SEVERAL = 4096
 #: A plane is upright or level if it leans by less than this (sine).
 _STRAIGHT = 3e-3
+#: Walls of a curve turn by less than 30° at each edge (cosine).
+_CURVE = 0.866
 #: Number of walls from which a surface may be a scan.
 _MANY = 1000
 

@@ -177,3 +177,21 @@ def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
     )
     assert len(tried) < len(scene.triangles) / 2
     assert any(abs(w.frame.plane[3] + 0.02) < 1e-4 and w.blocking.area > 10 for w in walls)
+
+
+@pytest.mark.parametrize(("axis", "curved"), [(1, 20), (0, 0)])
+def test_facets_of_a_tower_are_curved_walls_and_those_of_a_duct_are_not(
+    axis: int, curved: int
+) -> None:
+    turn = 2 * np.pi * np.arange(20) / 20
+    ring = np.column_stack([4 * np.cos(turn), np.zeros(20), 4 * np.sin(turn)])
+    after, up = np.roll(ring, -1, axis=0), np.array([0.0, 6.0, 0.0])
+    parts = [(ring, after + up, after), (ring, ring + up, after + up)]
+    parts += [(0 * ring, after, ring), (0 * ring + up, ring + up, after + up)]
+    corners = np.concatenate([np.stack(part, axis=1) for part in parts])
+    corners = np.roll(corners, axis - 1, axis=2)
+    fabric = Fabric.from_scene(scene_of(corners), SubdivideOptions())
+    tolerance = Tolerance.for_points(corners.reshape(-1, 3))
+    walls, _ = find_walls(Structure.from_fabric(fabric, tolerance), 1.0)
+    assert len(walls) == 22
+    assert sum(wall.curved for wall in walls) == curved

@@ -19,8 +19,8 @@ class CellsStage(Stage["Cells"]):
 
     name = "cells"
     about = "Read a model and divide its space into cells and portals."
-    recipe = 13
-    changed = "a garden takes no storeys from its house"
+    recipe = 14
+    changed = "curved walls divide less, and gardens take no storeys from houses"
     options = SubdivideOptions
     reads = (SCENE,)
     artifact = Lazy("ptmtools.cells.model:Cells")
