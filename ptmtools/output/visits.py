@@ -153,8 +153,8 @@ def _turns(
         large = np.where(dim & ~dim.all(), 0.0, total)
         level = float(heights[large >= _MAIN_SHARE * large.max()][0])
     off = heights - level
-    far, below = abs(off) > _AT_GROUND * eye, off < 0
-    return np.lexsort((abs(off), below, dim, far)).argsort()
+    off_ground, below = abs(off) > _AT_GROUND * eye, off < 0
+    return np.lexsort((abs(off), below, dim, off_ground)).argsort()
 
 
 def _kinds(
