@@ -21,23 +21,23 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measu
 
 
 def test_damaged_buildings_become_sound_databases() -> None:
-    summary = fuzz("rooms", seed=0, start=0, count=12)
+    summary = fuzz("rooms", seed=0, start=0, count=6)
     assert summary.tally.findings == []
     row = row_of(summary, seed=0)
-    assert row.counts["inputs"] == 12
-    assert row.counts["built"] >= 6
+    assert row.counts["inputs"] == 6
+    assert row.counts["built"] >= 3
 
 
 @pytest.mark.parametrize(("base", "number"), [("heights", 125), ("models", 49)])
 def test_leaves_that_are_thin_for_kilometres(base: str, number: int) -> None:
     """float32 bends a leaf of the first; every face of one of the second is narrower than the
     on-plane distance."""
-    assert fuzz(base, seed=94, start=number, count=1).tally.findings == []
+    assert fuzz(base, seed=94, start=number, count=1, light=False).tally.findings == []
 
 
 def test_a_door_leaf_that_is_open_above() -> None:
     """An eye inside of it belongs to the cells on both sides."""
-    assert fuzz("doors", seed=95, start=631, count=1).tally.findings == []
+    assert fuzz("doors", seed=95, start=631, count=1, light=False).tally.findings == []
 
 
 @pytest.mark.parametrize("fault", FAULTS)

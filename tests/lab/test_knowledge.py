@@ -60,7 +60,7 @@ def did(
 
 
 @EACH
-@settings(max_examples=40, phases=PHASES)
+@settings(max_examples=20, phases=PHASES)
 @given(SEEDS, st.integers(1, 1000), st.integers(1, 20))
 def test_the_way_to_come(policy: str, seed: int, budget: int, frames: int) -> None:
     """Who goes elsewhere later has done the same until then, however little fits into memory."""
@@ -91,7 +91,7 @@ def test_the_oracle_knows_the_way_to_come() -> None:
 
 
 @EACH
-@settings(max_examples=25, phases=PHASES)
+@settings(max_examples=15, phases=PHASES)
 @given(SEEDS, LINKS, BUDGETS)
 def test_what_has_not_come(policy: str, seed: int, link: Conditions, budget: int) -> None:
     """Records and geometry may say anything as long as they have not come."""
