@@ -42,18 +42,18 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (72_746, 351),
+    "ptmtools": (72_762, 351),
     "ptmtools/*.py": (4_170, 26),
-    "ptmtools/cells": (8_971, 29),
+    "ptmtools/cells": (8_975, 29),
     "ptmtools/cli": (3_095, 15),
     "ptmtools/coverage": (2_566, 15),
     "ptmtools/light": (3_445, 15),
     "ptmtools/meshopt": (867, 5),
-    "ptmtools/output": (8_142, 39),
+    "ptmtools/output": (8_152, 39),
     "ptmtools/pipeline": (4_008, 20),
     "ptmtools/portal_flow": (1_675, 8),
     "ptmtools/rendering": (2_047, 13),
-    "ptmtools/scene": (11_919, 60),
+    "ptmtools/scene": (11_921, 60),
     "ptmtools/schemas": (340, 1),
     "ptmtools/simplification": (1_950, 9),
     "ptmtools/site": (4_747, 25),

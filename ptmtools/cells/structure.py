@@ -171,7 +171,11 @@ def _mark_curved(walls: list[WallPlane], tolerance: Tolerance) -> list[WallPlane
     normal = np.array([w.frame.plane[:3] for w in walls])
     turn = np.abs(np.einsum("ij,ij->i", normal[i], normal[j]))
     meets = (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
-    meets &= (turn >= _CURVE) & (turn < tolerance.cosine) & (np.abs(normal[i, 1]) < _STRAIGHT)
+    upright = np.abs(normal[:, 1]) < _STRAIGHT
+    meets &= (turn >= _CURVE) & (turn < tolerance.cosine) & upright[i] & upright[j]
+    # Not where only their boxes do.
+    line = np.array([shapely.convex_hull(shapely.MultiPoint(p[:, [0, 2]])) for p in points])
+    meets[meets] = shapely.dwithin(line[i[meets]], line[j[meets]], tolerance.plane)
     curved = np.bincount(i[meets], minlength=len(walls)) >= 2
     return [replace(w, curved=bool(c)) for w, c in zip(walls, curved, strict=True)]
 

@@ -251,8 +251,8 @@ def _rows(model: Inspection, around: Enclosure, *, every: bool) -> Iterator[tupl
         yield "rooms", f"{len(scene.rooms)}: {some([r.name or 'unnamed' for r in scene.rooms])}"
     for warning in warnings(scene.notes):
         yield "warning", warning
-    shown = (note for note in scene.notes if every or note.code in GUESSES)
-    for text in lines(shown):
+    guesses = GUESSES if space.unit_guessed or space.up_guessed else ()
+    for text in lines(note for note in scene.notes if every or note.code in guesses):
         yield "note", text
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ptmtools import schemas
 from ptmtools.errors import InputError
-from ptmtools.options import degrees_text, option
+from ptmtools.options import degrees_text, option, require
 
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
@@ -357,10 +357,18 @@ class PlotOptions:
         None, "Shade the cells visible from this one by their average share of the view."
     )
     height: float = option(
-        1.2, "Height of the horizontal cut above the floor of each storey.", metavar="METRES"
+        1.2,
+        "Height of the horizontal cut above the floor of each storey, and between two of them at "
+        "least.",
+        metavar="METRES",
     )
     width: float = option(12.0, "Width of the picture.", metavar="INCHES")
     dpi: int = option(110, "Resolution, in dots per inch.")
+
+    def __post_init__(self) -> None:
+        """Raises InputError PTM-I111 for an impossible height."""
+        sound = 0 < self.height < float("inf")
+        require((sound, f"height is {self.height:g}", "use a number of metres above 0"))
 
 
 @dataclass(frozen=True)

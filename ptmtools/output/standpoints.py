@@ -8,6 +8,7 @@ of one square.
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,30 +134,30 @@ def places(
     outlook: Outlook,
     avatar_size: Vector,
     count: int,
+    taken: Set[int],
 ) -> tuple[list[Standpoint], int]:
-    """At most ``count`` places: first the best view among the largest of the rooms that are as good
-    to begin in as the first one, then the others in the order of `rooms_to_visit`; and the number
-    of rooms under a ceiling, or with a name, that come after these."""
+    """At most ``count`` places in rooms whose numbers are not ``taken``: first the best view among
+    the largest of the rooms that are as good to begin in as the first one, then the others in the
+    order of `rooms_to_visit`; and the number of rooms under a ceiling, or with a name, that come
+    after these."""
     rooms = rooms_to_visit(scene, cells, ground.floor_below, avatar_size[1])
-    by_room: dict[int, Standpoint | None] = {}
-    begin: list[tuple[Room, Standpoint]] = []
+    by_room: dict[int, Standpoint] = {}
+    best: list[tuple[Room, Standpoint]] = []
     waiting: set[int] = set()
     for room in rooms:
-        as_good = not begin or (
-            room.rank == begin[0][0].rank and room.size >= _AS_LARGE * begin[0][0].size
+        as_good = not best or (
+            room.rank == best[0][0].rank and room.size >= _AS_LARGE * best[0][0].size
         )
-        if by_room.get(room.number):
+        if room.number in taken or room.number in by_room:
             continue
-        if len(by_room) - [*by_room.values()].count(None) >= count and not as_good:
+        if len(by_room) >= count and not as_good:
             waiting |= {room.number} if room.is_indoors else set()
-            continue
-        place = by_room[room.number] = _place_in(room, cells, ground, outlook, avatar_size)
-        if place and as_good:
-            begin.append((room, place))
-    first = max((place for _, place in begin), key=lambda place: place.worth, default=None)
-    every = [place for place in by_room.values() if place]
-    ordered = sorted(every, key=lambda place: place is not first)
-    return ordered[:count], len(waiting) + len(ordered[count:])
+        elif place := _place_in(room, cells, ground, outlook, avatar_size):
+            by_room[room.number] = place
+            best += [(room, place)] if as_good else []
+    first = max((place for _, place in best), key=lambda place: place.worth, default=None)
+    ordered = sorted(by_room.values(), key=lambda place: place is not first)
+    return ordered[:count], len(waiting - by_room.keys()) + len(ordered[count:])
 
 
 def _place_in(

@@ -1,14 +1,14 @@
 """The viewpoints of a database, where a walk may start (paper §6: "a set of viewpoints from which
 the navigation can start").
 
-They are the user's, else the model's cameras; then one in each of the largest rooms without one
-(`standpoints`, `views`), with the name that the model gives the room, if any. A browser that
-ignores cells lists them in its menu and leads from one to the next in the order of the file, so
-the next one should be next door. The shortest ways from the first room form a tree (Dijkstra, over
-leaves and portals); the rooms are in the order of a walk around that tree, the shortest branch
-first, one storey after the other, and on each the rooms before places outdoors. A browser in WALK
-mode drops the viewpoint onto the floor, so it is put there beforehand: at the height of the eye
-above the nearest upward-facing surface below.
+They are the user's, else the model's cameras; then one in each of the rooms without one that are
+best to begin in (`visits`, `standpoints`, `views`), with the name that the model gives the room, if
+any. A browser that ignores cells lists them in its menu and leads from one to the next in the order
+of the file, so the next one should be next door. The shortest ways from the first room form a tree
+(Dijkstra, over leaves and portals); the rooms are in the order of a walk around that tree, the
+shortest branch first, one storey after the other, and on each the rooms before places outdoors. A
+browser in WALK mode drops the viewpoint onto the floor, so it is put there beforehand: at the
+height of the eye above the nearest upward-facing surface below.
 """
 
 from __future__ import annotations
@@ -251,10 +251,9 @@ def _touring(
     taken = {numbers[v.cell] for v in initial}
     count = max(options.viewpoint_count, not initial)
     size = options.avatar(cells.walker)
-    rooms, more = places(scene, cells, ground, outlook, size, count + len(taken))
-    if more:
-        notes.append(f"rooms without a viewpoint: {more}; --viewpoint-count adds some")
-    rooms = [place for place in rooms if numbers[place.cell] not in taken][:count]
+    rooms, rest = places(scene, cells, ground, outlook, size, count, taken)
+    if rest:
+        notes.append(f"rooms without a viewpoint: {rest}; --viewpoint-count adds some")
     if not rooms:
         return [] if initial else [_anywhere(cells, outlook, options)]
     leaf = cells.locate_leaf(np.array([place.position for place in rooms])).tolist()

@@ -188,6 +188,8 @@ def _ground_level(
     height = floor_below(drops)
     drops[:, 1] = height + eye
     drops = drops[np.isfinite(height)]
+    if not len(drops):
+        return None
     eyes = np.full(len(drops), eye)
     kind, roof = _kinds(around, drops[:, None], eyes, np.ones(len(drops)), eye)
     slab = _SLAB * eye / (WALKER.height * EYE)

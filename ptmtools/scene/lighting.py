@@ -59,11 +59,13 @@ def lights_of(
     source: ModelSource, used: Ints, space: Space, images: OptionalImages, shares: Floats
 ) -> Lights:
     """The lights of a model without its lightmaps. ``used``: (M,) the materials of the scene by
-    their numbers in the source; ``shares``: (M,) of the area of all surfaces."""
+    their numbers in the source, some twice; ``shares``: (M,) of the area of all surfaces."""
     materials = [source.materials[number] for number in used.tolist()]
-    glow = [_glow(m, images, share) for m, share in zip(materials, shares.tolist(), strict=True)]
+    distinct, first, group = np.unique(used, return_index=True, return_inverse=True)
+    whole = np.bincount(group, shares, len(distinct)).tolist()
+    glow = [_glow(materials[k], images, whole[n]) for n, k in enumerate(first.tolist())]
     return Lights(
-        np.array(glow, np.float32).reshape(-1, 3),
+        np.array(glow, np.float32).reshape(-1, 3)[group],
         np.array([material.unlit for material in materials], np.bool_),
         np.array([material.transmits for material in materials], np.float32),
         tuple(_place(lamp, space) for lamp in source.lamps),

@@ -81,8 +81,8 @@ class Material:
     opacity: in [0, 1].
     image: index into `Scene.images`, or -1.
     wrap_s, wrap_t: wrap modes beyond [0, 1].
-    transparent: never occludes: `opacity` < 1, alpha blending or testing, or a used texel with
-        alpha < 255 unless the mode of the material ignores alpha.
+    transparent: never occludes: `opacity` < 1, or a used texel with alpha < 255 unless the mode of
+        the material ignores alpha, or see-through by its definition.
     cutoff: texels with less alpha than this, in [0, 1], are not drawn, and all others are opaque;
         None if texels are blended.
     normal: its normal map, or None.

@@ -120,7 +120,7 @@ class SourceMaterial:
     ----------
     color: tint in [0, 1], sRGB; None if the model defines none.
     opacity: in [0, 1].
-    see_through: the material is blended, alpha-tested or transmitting by its own definition.
+    see_through: the material transmits light, or blends what its texture does not tell.
     ignores_alpha: the alpha of its texture has no effect, by the mode of the material (glTF, USD).
     cutoff: alpha testing: texels of less alpha are not drawn, all others are opaque; None if
         texels are blended.

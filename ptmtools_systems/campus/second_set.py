@@ -142,11 +142,12 @@ def _second_masks(read: SecondReading, scene: Scene) -> _Candidates:
     """The masks of a second reading."""
     source, faces = read.source, read.faces
     material = source.triangle_material[faces]
-    for number, index in enumerate(np.unique(material).tolist()):
+    numbers, first = np.unique(scene.triangle_material, return_index=True)
+    for number, index in zip(numbers.tolist(), material[first].tolist(), strict=True):
         texture = source.materials[index].texture
         if texture is None or scene.materials[number].image < 0:
             continue
-        faces_of = material == index
+        faces_of = scene.triangle_material == number
         mirrored = "mirror" in (texture.wrap_s, texture.wrap_t)
         if mirrored or not np.array_equal(source.uv[faces][faces_of], scene.uv[faces_of]):
             yield number, "", "other texture coordinates"

@@ -195,3 +195,24 @@ def test_facets_of_a_tower_are_curved_walls_and_those_of_a_duct_are_not(
     walls, _ = find_walls(Structure.from_fabric(fabric, tolerance), 1.0)
     assert len(walls) == 22
     assert sum(wall.curved for wall in walls) == curved
+
+
+def test_flat_walls_beside_others_are_not_curved() -> None:
+    """Parallel partitions in the box of a skewed wall, which they do not touch, and a roof that
+    leans towards a facade of two faces."""
+
+    def upright(*ends: float, lean: float = 0.0) -> np.ndarray:
+        x0, z0, x1, z1 = ends
+        a, b = np.array([x0, 0, z0]), np.array([x1, 0, z1])
+        up = np.array([0.0, 3.0, lean])
+        return np.array([[a, b, b + up], [a, b + up, a + up]])
+
+    skew = [upright(0, 0, 10, 3.6), upright(6, 0.3, 9, 0.3), upright(6, 0.9, 9, 0.9)]
+    mansard = [upright(20, z, 30, z) for z in (0.0, 0.3)]
+    mansard += [upright(20, z, 30, z, lean=1.0) + [0, 3, 0] for z in (0.0, 0.3)]
+    corners = np.concatenate(skew + mansard)
+    fabric = Fabric.from_scene(scene_of(corners), SubdivideOptions())
+    tolerance = Tolerance.for_points(corners.reshape(-1, 3))
+    walls, _ = find_walls(Structure.from_fabric(fabric, tolerance), 1.0)
+    assert len(walls) >= 5
+    assert not any(wall.curved for wall in walls)

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.output import GivenViewpoint
 from ptmtools.output.model import Viewpoint, WriterOptions
 from ptmtools.output.viewpoints import place_viewpoints
 from ptmtools.scene import IngestOptions, ingest
+from ptmtools.scene.orientation.space import to_world
 from tests.cells.buildings import AXES, carved, room, write
 from tests.scene.buildings import box
 
@@ -75,3 +77,31 @@ def test_a_car_leaves_room_in_a_garage(tmp_path: Path) -> None:
     views, floors = viewpoints(tmp_path, {"walls": carved(rooms, [door]), "Car": car})
     assert len(views) == 2
     assert floors == [0, 0]
+
+
+def test_pavilions_far_apart_need_no_ground(tmp_path: Path) -> None:
+    parts = {}
+    for k, start in enumerate((0, 300)):
+        space = room(start, start, start + 5, start + 4, 0, 2.6)
+        door = (start + 1, start - 0.2, 0), (start + 2, start, 2.1)
+        parts[f"house{k}"] = carved([space], [door])
+    views, floors = viewpoints(tmp_path, parts)
+    assert floors[:2] == [0, 0]
+    assert abs(views[0].position[0] - views[1].position[0]) > 290
+
+
+def test_rooms_without_a_viewpoint_are_counted(tmp_path: Path) -> None:
+    """Those of the user take none from a room that they are not in."""
+    rooms = [room(5.2 * k, 0, 5.2 * k + 5, 4, 0, 2.6) for k in range(4)]
+    doors = [((5.2 * k + 5, 1, 0), (5.2 * k + 5.2, 2, 2.1)) for k in range(3)]
+    doors.append(((1, -0.2, 0), (2, 0, 2.1)))
+    parts = {"walls": carved(rooms, doors), "lawn": box((-9, -9, -0.3), (30, -0.2, -0.1))}
+    scene = ingest(write(tmp_path / "model.obj", parts.items()), IngestOptions(**AXES))
+    cells = subdivide(scene, SubdivideOptions(gain=1.0))
+    lawn = tuple(to_world(np.array([[1.5, -4.0, 1.6]]), scene.space)[0].tolist())
+    for count in (1, 3, 4):
+        options = WriterOptions(viewpoint_count=count, viewpoints=(GivenViewpoint(lawn, 0.0),))
+        views, notes = place_viewpoints(scene, cells, options)
+        assert len(views) == count + 1
+        expected = [f"rooms without a viewpoint: {4 - count};"] * (count < 4)
+        assert [note.split(" --")[0] for note in notes if "without a" in note] == expected

@@ -217,3 +217,9 @@ def test_leaks_are_ringed(artifacts, tmp_path: Path) -> None:
     at = np.argwhere(abs(ringed - [0xE0, 0x94, 0x00]).sum(axis=2) < 12)
     in_plan = at[at[:, 0] > 40]  # below the legend
     assert in_plan[:, 1].max() < 0.6 * ringed.shape[1]
+
+
+@pytest.mark.parametrize("height", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_cut_is_above_the_floor(height: float) -> None:
+    with pytest.raises(InputError, match="above 0"):
+        PlotOptions(height=height)

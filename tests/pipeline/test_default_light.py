@@ -74,7 +74,7 @@ def test_bytes_are_rounded(
     images: tuple[int, ...], rounded: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(scene, "image_rows", lambda _: [{"bytes": size} for size in images])
-    assert scene.image_bytes(cast("Any", None)) == rounded
+    assert scene.rounded_image_bytes(cast("Any", None)) == rounded
 
 
 def repaint(model: Path, side: int) -> int:

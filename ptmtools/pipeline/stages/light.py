@@ -34,9 +34,9 @@ from ptmtools.pipeline.stages.probes import (
 )
 from ptmtools.pipeline.stages.scene import (
     SCENE,
-    image_bytes,
     image_digests,
     lights_of,
+    rounded_image_bytes,
     scene_origin,
 )
 from ptmtools.pipeline.stages.textures import TEXTURES, stored_texture, texture_files
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 _COARSE = 0.5
 #: Decoded bytes of a lightmap of the model, which the scene stage has already decoded.
 _MOST = 1 << 40
-#: The input for the bytes of the images, as `image_bytes`.
+#: The input for the bytes of the images, as `rounded_image_bytes`.
 _IMAGES = "bytes of images"
 #: An input of a run that left out the lightmaps, as long as xatlas is not installed.
 _ABSENT = "xatlas"
@@ -362,7 +362,7 @@ class LightStage(Stage["Light"]):
             return {}
         lights = {} if digest is None else {name: digest}
         if options.light == "auto":
-            lights[_IMAGES] = sha256(str(image_bytes(artifacts)).encode())
+            lights[_IMAGES] = sha256(str(rounded_image_bytes(artifacts)).encode())
         before = artifacts.before(self)
         if before and _ABSENT in before.inputs and options.light == "auto" and _absence():
             lights[_ABSENT] = ""
@@ -408,7 +408,7 @@ class LightStage(Stage["Light"]):
         geometry = Geometry(scene, cells)
         pieces = pieces_of(geometry, cells, unlit, 1 / asked, replaced)
         if options.light == "auto" and not model_light:
-            density = affordable_density(pieces, asked, image_bytes(run))
+            density = affordable_density(pieces, asked, rounded_image_bytes(run))
             if not density:
                 return complete(work, _NO_LIGHT, _notes_on_size(pieces))
             options = replace(options, light_density=density)

@@ -69,7 +69,7 @@ def image_digests(artifacts: Artifacts) -> dict[str, str]:
     return {row["name"]: row["sha256"] for row in image_rows(artifacts)}
 
 
-def image_bytes(artifacts: Artifacts) -> int:
+def rounded_image_bytes(artifacts: Artifacts) -> int:
     """The bytes of the scene's images as in the model, or somewhat less: a power of two, so that
     what depends on them stays the same if they are repainted. 0 for none; raises as `image_rows`.
     """

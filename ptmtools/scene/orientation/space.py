@@ -211,14 +211,14 @@ def _judge_axis(ranked: list[Candidate], by_format: Up | None, notes: IngestNote
             "PTM-N202",
             f"up axis guessed: {best.up.upper()}, {best.size}{for_best}; use --up to override",
         )
+        # In the unit that will be guessed.
+        rival = next((c for c in ranked if c.up == rival.up and c.unit in UNITS), rival)
         if rival.rivals(best):
-            # In the unit that will be guessed.
-            rival = next((c for c in ranked if c.up == rival.up and c.unit in UNITS), rival)
             unit = f", unit {rival.unit}" if rival.unit != best.unit else ""
             notes.note(
                 "PTM-N238",
                 f"second-best guess: {rival.up.upper()} as the up axis{unit}, "
-                f"{rival.size}{for_rival}; use --up {rival.up} to select it",
+                f"{rival.size}{_reasons(rival, best)}; use --up {rival.up} to select it",
             )
     return best.up
 
