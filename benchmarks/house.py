@@ -42,14 +42,14 @@ from benchmarks.codebase.sources import PythonFile, read_imports, read_packages
 
 #: Lines and files. Aim: `ptmtools` 58,000 lines in 290 files, all packages 78,000 lines.
 BUDGET: dict[str, tuple[int, int]] = {
-    "ptmtools": (72_762, 351),
+    "ptmtools": (72_740, 351),
     "ptmtools/*.py": (4_170, 26),
     "ptmtools/cells": (8_975, 29),
     "ptmtools/cli": (3_095, 15),
     "ptmtools/coverage": (2_566, 15),
     "ptmtools/light": (3_445, 15),
     "ptmtools/meshopt": (867, 5),
-    "ptmtools/output": (8_152, 39),
+    "ptmtools/output": (8_130, 39),
     "ptmtools/pipeline": (4_008, 20),
     "ptmtools/portal_flow": (1_675, 8),
     "ptmtools/rendering": (2_047, 13),

@@ -17,7 +17,6 @@ from ptmtools.options import degrees_text, option, require
 
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
-    from ptmtools.scene.model import Scene
     from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
     from ptmtools.texture.previews import Preview
@@ -402,12 +401,3 @@ def convert_shape_errors(code: str, place: str = "") -> Iterator[None]:
         yield
     except schemas.ShapeError as fault:
         raise FileError(code, fault.place or place, fault.message) from None
-
-
-def storey_name(scene: Scene, floor: float, gap: float) -> str:
-    """The name of the storey that is nearest to a floor, the lower of two; "" if the model names
-    none that is nearer than half of ``gap``, metres. Floors that far apart are different storeys'.
-    """
-    near = [(abs(storey.height - floor), storey.name) for storey in scene.storeys]
-    distance, name = min(near, key=lambda pair: pair[0], default=(gap, ""))
-    return name if distance < gap / 2 else ""

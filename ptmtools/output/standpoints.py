@@ -113,7 +113,6 @@ class Standpoint:
     position: (3,) of the eye.
     yaw: radians, counter-clockwise from -Z, of the best view.
     worth: of that view.
-    floor: height of the floor below.
     storey: height of the storey's main floor.
     indoors: whether the room has a name or a ceiling.
     """
@@ -122,7 +121,6 @@ class Standpoint:
     position: Floats
     yaw: float
     worth: float
-    floor: float
     storey: float
     indoors: bool
 
@@ -204,9 +202,7 @@ def _place_in(
     view = outlook.best(position[tried], main + eye)
     i = tried[view.place]
     cell = int(cells.leaf_cell[leaves[number[i]]])
-    return Standpoint(
-        cell, position[i], view.yaw, view.worth, float(floor[i]), room.storey, room.is_indoors
-    )
+    return Standpoint(cell, position[i], view.yaw, view.worth, room.storey, room.is_indoors)
 
 
 def _main_floor(floor: Floats, area: Floats, step: float) -> float:

@@ -21,7 +21,6 @@ import numpy as np
 from ptmtools.arrays import Floats, normals
 from ptmtools.cells.model import Cells
 from ptmtools.cells.structure import Surroundings
-from ptmtools.output.model import storey_name
 from ptmtools.scene.model import Scene
 
 
@@ -115,7 +114,8 @@ def storeys(scene: Scene, cells: Cells, height: float) -> list[float]:
             least = max(least, share * float(within[best]))
         elif middle is level:
             break
-    return sorted(floors)
+    lowest = cells.leaf_point[:, 1].min(initial=np.inf)
+    return sorted(floors) or [float(lowest)] * bool(cells.leaf_count)
 
 
 def _rooms_floor(scene: Scene, cells: Cells) -> tuple[Floats, Floats, bool]:
@@ -146,10 +146,18 @@ def _rooms_floor(scene: Scene, cells: Cells) -> tuple[Floats, Floats, bool]:
 def storey_names(scene: Scene, floors: Sequence[float]) -> list[str]:
     """The name of the storey on each of all ``floors``: the model's, else its number; "" for the
     only one if the model does not name it."""
-    names = [storey_name(scene, floor, _NAME_GAP) for floor in floors]
+    names = [_name_of(scene, floor) for floor in floors]
     if len(floors) > 1:
         names = [name or f"Storey {number}" for number, name in enumerate(names, 1)]
     return names
+
+
+def _name_of(scene: Scene, floor: float) -> str:
+    """The name of the storey that is nearest to a floor, the lower of two; "" if the model names
+    none that is near."""
+    near = [(abs(storey.height - floor), storey.name) for storey in scene.storeys]
+    distance, name = min(near, key=lambda pair: pair[0], default=(np.inf, ""))
+    return name if distance < _NAME_GAP / 2 else ""
 
 
 def main_floors(floors: Floats, sizes: Floats, gap: float) -> Floats:

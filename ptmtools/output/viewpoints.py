@@ -23,8 +23,9 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
-from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions, storey_name
+from ptmtools.output.model import TextureRecord, Viewpoint, WriterOptions
 from ptmtools.output.standpoints import FloorFinder, places
+from ptmtools.output.storeys import storey_names
 from ptmtools.output.views import Outlook
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE
@@ -262,13 +263,12 @@ def _touring(
     height = [place.storey for place in rooms]
     first = list(dict.fromkeys(height))
     order.sort(key=lambda i: (first.index(height[i]), not rooms[i].indoors))
-    storey = [sorted(first).index(h) for h in height]
-    names = _storey_names(scene, [place.floor for place in rooms], storey, size[1])
+    names = dict(zip(sorted(first), storey_names(scene, sorted(first)), strict=True))
     number: Counter[tuple[str, str]] = Counter()
     views: list[Viewpoint] = []
     for i in order:
         place, field = rooms[i], options.field_of_view
-        level = names[i] if len(first) > 1 else ""
+        level = names[height[i]] if len(first) > 1 else ""
         name = _name(cells.room_name(place.cell), level, number)
         views.append(_viewpoint(name, place.position, _heading(place.yaw), field, place.cell))
     return views
@@ -283,22 +283,6 @@ def _name(room: str, level: str, number: Counter[tuple[str, str]]) -> str:
         return f"{level}, room {count}" if level else f"Room {count}"
     name = f"{level}, {room}" if level else room
     return f"{name} ({count})" if count > 1 else name
-
-
-def _storey_names(
-    scene: Scene, floors: Sequence[float], storey: Sequence[int], gap: float
-) -> list[str]:
-    """The name of each floor's storey: by the floor's height, else by the height of the storey's
-    lowest floor, else by the storey's number."""
-    lowest: dict[int, float] = {}
-    for floor, number in zip(floors, storey, strict=True):
-        lowest[number] = min(floor, lowest.get(number, floor))
-    return [
-        storey_name(scene, floor, gap)
-        or storey_name(scene, lowest[number], gap)
-        or f"Storey {number + 1}"
-        for floor, number in zip(floors, storey, strict=True)
-    ]
 
 
 def _anywhere(cells: Cells, outlook: Outlook, options: WriterOptions) -> Viewpoint:

@@ -191,25 +191,39 @@ def test_an_image_stays_one_where_opaque_materials_use_opaque_texels(put: Put) -
     assert scene.images[0].load() == png(pixels)
 
 
-def test_only_faces_that_use_transparent_texels_are_transparent(put: Put) -> None:
-    """One tile of glass in the atlas of a building does not make its walls transparent."""
+def with_atlas(doc: GltfModel) -> GltfModel:
+    """Two quads that show tiles of one image, the second a tile of glass, and a plain one; all
+    blend, glow and reflect by images."""
     pixels = noise(1, bands=4)
     pixels[..., 3] = 255
     pixels[:4, :4, 3] = 99  # the upper left tile
-    tiles = [[(0, y), (0.5, y), (0.5, y + 0.5), (0, y + 0.5)] for y in (0.5, 0)]
-    base = GltfModel()
-    material = {**with_image(base, png(pixels)), "alphaMode": "BLEND", "name": "atlas"}
-    base.tree["materials"] = [material, {"name": "plain"}]
-    for place, tile in enumerate(tiles):
-        quad = base.quad(material=0)
-        quad["attributes"]["TEXCOORD_0"] = base.add(np.array(tile, np.float32))
-        base.place(quad, translation=[0, 0, 5 * place])
-    base.place(base.quad(material=1), translation=[0, 0, 20])
-    scene = ingest(put("a.glb", base.glb()))
+    material = {**with_image(doc, png(pixels)), "alphaMode": "BLEND", "name": "atlas"}
+    doc.tree["images"].append({"bufferView": doc.view(png(noise(2))), "mimeType": "image/png"})
+    doc.tree["textures"].append({"source": 1})
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": 1}
+    material |= {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 1}}
+    doc.tree["materials"] = [material, {"name": "plain"}]
+    for place, y in enumerate((0.5, 0)):
+        tile = [(0, y), (0.5, y), (0.5, y + 0.5), (0, y + 0.5)]
+        quad = doc.quad(material=0)
+        quad["attributes"]["TEXCOORD_0"] = doc.add(np.array(tile, np.float32))
+        doc.place(quad, translation=[0, 0, 5 * place])
+    doc.place(doc.quad(material=1), translation=[0, 0, 20])
+    return doc
+
+
+def test_only_faces_that_use_transparent_texels_are_transparent(put: Put) -> None:
+    """One tile of glass in the atlas of a building does not make its walls transparent."""
+    scene = ingest(put("a.glb", with_atlas(GltfModel()).glb()))
     assert [m.name for m in scene.materials] == ["atlas", "plain", "atlas"]
     assert [m.transparent for m in scene.materials] == [True, False, False]
     assert len(scene.images) == 1
     assert scene.opaque.tolist() == [True, True, False, False, True, True]
+    (note,) = [note for note in scene.notes if "emission" in note.message]
+    assert note.message.endswith("on 0.67 of all area")
+    assert note.count == 1
+    assert scene.lights is not None
+    assert np.array_equal(scene.lights.glow[0], scene.lights.glow[2])
 
 
 def test_what_transmits_light_ignores_alpha_too(put: Put) -> None:

@@ -17,6 +17,8 @@ from ptmtools.scene import IngestOptions, ingest
 from ptmtools_systems.campus import CampusOptions, make_campus
 from ptmtools_systems.campus.making import _light_source
 from ptmtools_systems.campus.second_set import ModelLight, model_light, model_masks
+from tests.scene.conftest import GltfModel
+from tests.scene.test_gltf import with_atlas
 from tests.systems.campus.models import MTL, write_campus, write_gltf
 
 METRES = IngestOptions(unit="m", up="y")
@@ -131,3 +133,13 @@ def test_the_source_of_a_lightmap_is_the_largest_image() -> None:
     work = SimpleNamespace(painted=painted)
     assert _light_source(cast("Any", work), np.array([0, 1])) == (2000, 100)
     assert _light_source(cast("Any", work), np.array([0])) == (10, 101)
+
+
+def test_both_parts_of_a_material_have_its_mask(tmp_path: Path) -> None:
+    """Faces that use transparent texels are a material of their own."""
+    model = tmp_path / "model.glb"
+    model.write_bytes(with_atlas(GltfModel()).glb())
+    scene = ingest(model)
+    masks, notes = model_masks(model, scene, IngestOptions())
+    assert [scene.materials[number].name for number in sorted(masks)] == ["atlas", "atlas"]
+    assert notes == ()
