@@ -216,3 +216,29 @@ def test_flat_walls_beside_others_are_not_curved() -> None:
     walls, _ = find_walls(Structure.from_fabric(fabric, tolerance), 1.0)
     assert len(walls) >= 5
     assert not any(wall.curved for wall in walls)
+
+
+def test_rings_around_a_well_are_rooms_each() -> None:
+    """Tangents of the well do not cut the room of another storey, nor each other's more than
+    convex parts need."""
+    turn = 2 * np.pi * np.arange(24) / 24
+    around = np.column_stack([np.cos(turn), np.zeros(24), np.sin(turn)])
+    triangles = []
+    for low in (0.0, 3.3):
+        ring = {
+            (radius, height): radius * around + [0.0, low + height, 0.0]
+            for radius in (1.5, 6.0)
+            for height in (0.0, 3.0)
+        }
+        for corners in (
+            [(6.0, 0.0), (6.0, 3.0)],
+            [(1.5, 3.0), (1.5, 0.0)],
+            [(1.5, 0.0), (6.0, 0.0)],
+            [(6.0, 3.0), (1.5, 3.0)],
+        ):
+            a, b = (ring[corner] for corner in corners)
+            c, d = np.roll(b, -1, axis=0), np.roll(a, -1, axis=0)
+            triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    cells = subdivide(scene_of(np.concatenate(triangles)))
+    assert cells.cell_count == 2
+    assert cells.leaf_count <= 30
